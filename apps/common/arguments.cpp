@@ -8,6 +8,7 @@
 #include <charconv>
 #include <cmath>
 #include <sstream>
+#include <stdexcept>
 
 #include "vdvr/error.hpp"
 
@@ -257,6 +258,14 @@ std::optional<std::vector<double>> Arguments::numbers(const std::string& name, s
   return result;
 }
 
+std::optional<std::array<double, 2>> Arguments::one_or_two(const std::string& name) const {
+  if (!has(name)) return std::nullopt;
+  const auto values = *numbers(name, text(name).find(',') == std::string::npos ? 1 : 2);
+  if (!(values.front() > 0 && values.back() > 0))
+    throw InputError(fmt::format("{}: {} is not above 0", option(name), text(name)));
+  return std::array{values.front(), values.back()};
+}
+
 std::optional<Vec3> Arguments::vec3(const std::string& name) const {
   const auto values = numbers(name, 3);
   if (!values) return std::nullopt;
@@ -278,6 +287,14 @@ std::optional<std::vector<std::int64_t>> Arguments::sizes(const std::string& nam
           fmt::format("{}: {} is not between 1 and {}", option(name), part, std::int64_t{1} << 30));
   }
   return result;
+}
+
+std::string Arguments::choice(const std::string& name, const std::string& fallback) const {
+  if (!has(name)) return fallback;
+  for (const auto& g : groups_)
+    if (const auto* declared = g.find_nothrow(name, /*approx=*/false))
+      return choice(name, split(declared->semantic()->name(), '|'), fallback);
+  throw std::logic_error("choice: --" + name + " is not declared");
 }
 
 std::string Arguments::choice(const std::string& name, const std::vector<std::string>& allowed,

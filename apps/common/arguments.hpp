@@ -60,13 +60,16 @@ class Arguments {
   [[nodiscard]] std::optional<std::int64_t> integer(const std::string& name) const;
   [[nodiscard]] std::int64_t integer_or(const std::string& name, std::int64_t fallback, std::int64_t lowest,
                                         std::int64_t highest) const;
-  /// `count` numbers separated by commas.
   /// Numbers separated by commas; a count of 0 takes any.
   [[nodiscard]] std::optional<std::vector<double>> numbers(const std::string& name, std::size_t count) const;
+  /// One number or two, above 0; one stands for both.
+  [[nodiscard]] std::optional<std::array<double, 2>> one_or_two(const std::string& name) const;
   [[nodiscard]] std::optional<Vec3> vec3(const std::string& name) const;
   /// `count` positive integers separated by 'x'.
   [[nodiscard]] std::optional<std::vector<std::int64_t>> sizes(const std::string& name,
                                                                std::size_t count) const;
+  /// One of those that the placeholder lists, `a|b|c`; `fallback` when absent.
+  [[nodiscard]] std::string choice(const std::string& name, const std::string& fallback) const;
   /// One of `allowed`; `fallback` when absent.
   [[nodiscard]] std::string choice(const std::string& name, const std::vector<std::string>& allowed,
                                    const std::string& fallback) const;

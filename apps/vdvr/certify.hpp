@@ -8,8 +8,11 @@
 
 #include "apps/common/common_options.hpp"
 #include "apps/vdvr/options.hpp"
-#include "apps/vdvr/scan_noise.hpp"
+#include "apps/vdvr/inputs.hpp"
 #include "vdvr/certify_scan.hpp"
+#include "vdvr/expert/certify.hpp"
+#include "vdvr/expert/noise_forecast.hpp"
+#include "vdvr/expert/picture_refinement.hpp"
 #include "vdvr/expert/progress.hpp"
 #include "vdvr/expert/projections.hpp"
 #include "vdvr/expert/understood.hpp"

@@ -3,8 +3,9 @@
 
 #include <optional>
 
-#include "apps/vdvr/pictures.hpp"
+#include "apps/vdvr/inputs.hpp"
 #include "vdvr/expert/progress.hpp"
+#include "vdvr/raycast.hpp"
 
 namespace vdvr::cli {
 

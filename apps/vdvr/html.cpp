@@ -89,6 +89,33 @@ std::string shell_line(const std::vector<std::string>& words) {
   return out;
 }
 
+std::string pairs_table(const Pairs& pairs) {
+  std::string html = "<table class=\"pairs\"><tbody>\n";
+  for (const auto& [name, value] : pairs)
+    html += fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td></tr>\n", name, value);
+  return html + table_end;
+}
+
+std::string table_head(const std::vector<std::string>& columns, bool bars) {
+  std::string html = fmt::format("<table><thead><tr><th>{}</th>", columns.front());
+  for (std::size_t i = 1; i < columns.size(); ++i) html += fmt::format("<th class=\"n\">{}</th>", columns[i]);
+  return html + (bars ? "<th></th>" : "") + "</tr></thead><tbody>\n";
+}
+
+std::string table_row(const std::string& name, const std::vector<std::string>& numbers,
+                      const std::string& bar) {
+  std::string html = fmt::format("<tr><th scope=\"row\">{}</th>", name);
+  for (const std::string& number : numbers) html += fmt::format("<td class=\"n\">{}</td>", number);
+  return html + (bar.empty() ? "" : fmt::format("<td class=\"b\">{}</td>", bar)) + "</tr>\n";
+}
+
+std::string code(const std::string& text) { return fmt::format("<code>{}</code>", escaped(text)); }
+
+std::string percent(double value, double whole) {
+  return fmt::format("{}\xE2\x80\xAF%",
+                     whole > 0 ? fmt::format("{:.3g}", 100 * value / whole) : "\xE2\x80\x93");
+}
+
 std::string number_text(double value) {
   return std::isfinite(value) ? fmt::format("{:.4g}", value) : "\xE2\x80\x93";
 }

@@ -16,6 +16,73 @@ namespace fs = std::filesystem;
 
 namespace vdvr::cli {
 
+// --- scans ---
+
+namespace {
+
+// Digits, colons and commas make ranges; anything else that ends so is a file.
+bool names_file(const Arguments& args) {
+  return args.has("views") && args.text("views").find_first_not_of("0123456789:,") != std::string::npos;
+}
+
+/// --darks and --flats: a level, or none.
+std::optional<double> level(const Arguments& args, const std::string& name, double if_none) {
+  if (!args.has(name)) return {};
+  const std::string text = args.text(name);
+  return text == "none" ? if_none : parse_number("--" + name, text);
+}
+
+}  // namespace
+
+void add_scan(Arguments& args) {
+  args.group("Input (what its files do not say, or say otherwise)")
+      .value("angles-file", "FILE",
+             "for stacks and HDF5 files: angles, one per view; degrees, unless --angle-unit says otherwise")
+      .value("angle-unit", "degrees|radians", "of the angles, whatever the file of them says")
+      .value("beam", "cone|parallel",
+             "cone: by the distances of an NXtomo file, which is read as parallel beam otherwise")
+      .value("entry", "NAME", "the group of an HDF5 file that holds the scan, where there are several")
+      .value("views", "RANGES", "the projections used, half-open ranges counted from 0: 0:40,41:90")
+      .value("darks", "none|LEVEL", "counts without beam, in place of darks; none: 0")
+      .value("flats", "none|LEVEL", "counts of the open beam, in place of flats; none: 1")
+      .flag("transmission", "values are transmissions: normalised by flats and darks, without -log")
+      .flag("line-integrals", "values are line integrals: normalised, and -log was taken")
+      .flag("follow-links",
+            "read and hash what HDF5 links and virtual datasets name outside the scan's folder too");
+}
+
+InputStatement input_statement(const Arguments& args, const InputStatement& stored) {
+  InputStatement s = stored;
+  if (args.has("entry")) s.entry = args.text("entry");
+  if (args.has("views") && !names_file(args)) s.views = view_ranges_of(args.text("views"));
+  else if (args.has("views") && !args.has("picture-tolerance"))
+    throw InputError(
+        fmt::format("--views: '{}' is no list of ranges, such as 0:40,41:90 (files of cameras go with "
+                    "--picture-tolerance)",
+                    args.text("views")));
+  if (const auto dark = level(args, "darks", 0)) s.dark = dark;
+  if (const auto flat = level(args, "flats", 1)) s.flat = flat;
+  if (args.has("transmission") && args.has("line-integrals"))
+    throw InputError("--transmission and --line-integrals exclude each other");
+  if (args.has("transmission")) s.values = SampleValues::transmission;
+  if (args.has("line-integrals")) s.values = SampleValues::line_integrals;
+  if (args.has("angle-unit")) {
+    s.angle_unit = angle_unit_of(args.text("angle-unit"));
+    if (!s.angle_unit)
+      throw InputError(
+          fmt::format("--angle-unit: '{}'; it must be degrees or radians", args.text("angle-unit")));
+  }
+  return s;
+}
+
+bool has_picture_views(const Arguments& args) {
+  return args.has("picture-views") || (args.has("picture-tolerance") && names_file(args));
+}
+
+std::string picture_views(const Arguments& args) {
+  return args.text(args.has("picture-views") ? "picture-views" : "views");
+}
+
 InputKind kind_of(const fs::path& path, const Arguments& args) {
   std::error_code error;
   const fs::path file = file_of_volume(path);
@@ -58,7 +125,7 @@ ScanOptions scan_options(const Arguments& args, const FieldOptions& field, std::
                          const InputStatement& stored) {
   ScanOptions options;
   if (args.has("angles-file")) options.angles_file = args.path("angles-file");
-  options.beam = args.has("beam") ? beam_of(args.choice("beam", {"cone", "parallel"}, "parallel")) : beam;
+  options.beam = args.has("beam") ? beam_of(args.choice("beam", "parallel")) : beam;
   options.center = field.center;
   options.preparation = field.preparation;
   options.input = input_statement(args, stored);
@@ -119,6 +186,41 @@ ProjectionSet load_certified_scan(const fs::path& path, const Arguments& args, c
   return scan;
 }
 
+// --- the noise of scans ---
+
+void add_noise(Arguments& args) {
+  args.group("Noise (an estimate, beside what is certified)")
+      .value("photons", "N0",
+             "of a pixel in the open beam (default: from repeated flats, or the projections)")
+      .value("sigma-p", "S", "the standard deviation of every line integral");
+}
+
+NoiseOptions noise_options(const Arguments& args) {
+  NoiseOptions options;
+  if (args.has("photons")) options.photons = args.positive_or("photons", 0);
+  if (args.has("sigma-p")) options.sigma_p = args.positive_or("sigma-p", 0);
+  return options;
+}
+
+NoiseFound noise_of_scan(const fs::path& path, const Arguments& args, const FieldOptions& field,
+                         const ProjectionSet& scan) {
+  NoiseFound found;
+  found.noise = read_scan_noise(path, scan_options(args, field), scan, noise_options(args), &found.why);
+  return found;
+}
+
+// --- volumes ---
+
+void add_volume_input(Arguments& args) {
+  args.value("nan-as", "V", "of a uniform volume: read samples that are no finite numbers as V");
+}
+
+Volume load_volume(const fs::path& path, const Arguments& args) {
+  std::optional<double> nan_as;
+  if (args.has("nan-as")) nan_as = args.number_or("nan-as", 0);
+  return read_volume(path, common_options(args).max_memory, nan_as);
+}
+
 VdvrFile open_certified(const fs::path& path, const Arguments& args, bool unverified) {
   const CommonOptions common = common_options(args);
   const std::uint64_t memory = common.max_memory / static_cast<std::uint64_t>(processes_here());
@@ -139,6 +241,26 @@ void check_projections(const fs::path& path, const ProjectionSet& scan, const Ce
     e.add_context(path.string());
     throw;
   }
+}
+
+Scene open_scene(const fs::path& path, const Arguments& args, const std::string& method, bool unverified) {
+  switch (kind_of(path, args)) {
+    case InputKind::certified: {
+      VdvrFile file = open_certified(path, args, unverified);
+      // Samples on the grid alone are an ordinary volume; the certificate says nothing about their
+      // interpolation.
+      if (method == "dvr") return {as_mixed(on_grid(file.volume)), std::nullopt, false};
+      return {std::move(file.volume), std::move(file.certificate), !unverified};
+    }
+    case InputKind::volume:
+      return {as_mixed(load_volume(path, args)), std::nullopt, false};
+    case InputKind::scan:
+      break;
+  }
+  throw InputError(
+      fmt::format("{}: is neither a certified volume nor a uniform one (MHA, NRRD, FILE.h5:/dataset, TIFF "
+                  "slices); build or reconstruct it first, or draw projections with --method d2vr",
+                  path.string()));
 }
 
 }  // namespace vdvr::cli

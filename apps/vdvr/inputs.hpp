@@ -1,11 +1,15 @@
-// What commands read: telling the kinds of files apart, loading them under the command's options, and
-// comparing hashes.
+// What commands read: the options that say what inputs are, declared here and nowhere else; telling the kinds
+// of files apart, loading them under these options, and comparing hashes.
 #pragma once
 
 #include <filesystem>
+#include <optional>
+#include <string>
 
 #include "apps/vdvr/options.hpp"
+#include "vdvr/expert/input_statement.hpp"
 #include "vdvr/expert/mixed_volume.hpp"
+#include "vdvr/expert/noise.hpp"
 #include "vdvr/expert/progress.hpp"
 #include "vdvr/expert/projections.hpp"
 #include "vdvr/read_scan.hpp"
@@ -13,6 +17,19 @@
 #include "vdvr/vdvr_file.hpp"
 
 namespace vdvr::cli {
+
+// --- scans ---
+
+/// --angles-file, --beam, --follow-links, and what a user states of the input: --entry, --views, --darks,
+/// --flats, --transmission, --line-integrals.
+void add_scan(Arguments& args);
+
+/// What options state; what they do not is as `stored`, a certificate's.
+InputStatement input_statement(const Arguments& args, const InputStatement& stored = {});
+
+/// The cameras of --picture-tolerance: --picture-views, in earlier versions --views with a file.
+bool has_picture_views(const Arguments& args);
+std::string picture_views(const Arguments& args);
 
 enum class InputKind { certified, volume, scan };
 
@@ -37,11 +54,43 @@ ProjectionSet load_any_scan(const std::filesystem::path& path, const Arguments& 
 ProjectionSet load_certified_scan(const std::filesystem::path& path, const Arguments& args,
                                   const Certificate& certificate, const Progress& progress);
 
+// --- the noise of scans ---
+
+/// --photons and --sigma-p: what is known of the noise in place of what the scan tells.
+void add_noise(Arguments& args);
+NoiseOptions noise_options(const Arguments& args);
+
+struct NoiseFound {
+  std::optional<ScanNoise> noise;
+  std::string why;  ///< where there is none
+};
+/// Of the scan that was read from `path` with the same options.
+NoiseFound noise_of_scan(const std::filesystem::path& path, const Arguments& args, const FieldOptions& field,
+                         const ProjectionSet& scan);
+
+// --- volumes ---
+
+/// --nan-as, for commands that read uniform volumes.
+void add_volume_input(Arguments& args);
+/// read_volume, as the options say.
+Volume load_volume(const std::filesystem::path& path, const Arguments& args);
+
 /// A certified volume, by vdvr::read_certified; says on stderr that a file is unsealed. `unverified`: nothing
 /// is compared.
 VdvrFile open_certified(const std::filesystem::path& path, const Arguments& args, bool unverified = false);
 /// vdvr::check_input, which names the path.
 void check_projections(const std::filesystem::path& path, const ProjectionSet& scan,
                        const Certificate& certificate);
+
+/// A certified volume with its certificate, or a uniform one without.
+struct Scene {
+  MixedVolume volume;
+  std::optional<Certificate> certificate;
+  bool verified = false;  ///< the content's hash was compared with the certificate's
+};
+/// `method`: "vdvr" the mixed volume, "dvr" its base samples alone (a uniform volume is the same either way).
+/// Throws MismatchError for a content that does not match, unless `unverified`.
+Scene open_scene(const std::filesystem::path& path, const Arguments& args, const std::string& method,
+                 bool unverified);
 
 }  // namespace vdvr::cli

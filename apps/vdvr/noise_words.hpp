@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "apps/vdvr/certify.hpp"
-#include "apps/vdvr/scan_noise.hpp"
+#include "apps/vdvr/inputs.hpp"
 #include "vdvr/expert/noise.hpp"
 #include "vdvr/expert/noise_forecast.hpp"
 

@@ -20,35 +20,6 @@ std::vector<std::string> filter_names() {
   return names;
 }
 
-/// Options whose other values belong to later versions: name, all values, supported ones, help.
-struct Limited {
-  const char* name;
-  std::vector<std::string> all, supported;
-  const char* help;
-};
-const std::vector<Limited> kBuildLimits{
-    {"closing",
-     {"coarse", "paper", "none"},
-     {"coarse", "paper", "none"},
-     "how bricks of different levels meet (default coarse; none is for comparison, never certified)"},
-    {"coefficients",
-     {"midrange", "sampled"},
-     {"midrange", "sampled"},
-     "samples fitted to the trilinear filter, or F at the nodes (default midrange)"},
-    {"levels",
-     {"isotropic", "anisotropic"},
-     {"isotropic", "anisotropic"},
-     "one level per brick, or one per axis of a brick (default anisotropic)"},
-    {"storage",
-     {"auto", "f32", "u16", "u8"},
-     {"auto", "f32", "u16", "u8"},
-     "sample type of base and tiles (default auto)"},
-    {"terms",
-     {"all", "grid"},
-     {"all", "grid"},
-     "error terms that are charged (default all; grid is for comparison, never certified)"},
-    {"epsilon-of", {"range", "max"}, {"range", "max"}, "what --epsilon is a fraction of (default range)"}};
-
 const std::map<std::string, StorageChoice> kStorage{{"auto", StorageChoice::automatic},
                                                     {"f32", StorageChoice::f32},
                                                     {"u16", StorageChoice::u16},
@@ -140,7 +111,7 @@ Preparation preparation_options(const Arguments& args) {
 
 FieldOptions field_options(const Arguments& args) {
   FieldOptions field;
-  field.filter = ramp_window_of(args.choice("filter", filter_names(), text_of(field.filter))).value();
+  field.filter = ramp_window_of(args.choice("filter", text_of(field.filter))).value();
   field.cutoff = args.positive_or("filter-cutoff", field.cutoff);
   if (field.cutoff > 1) throw InputError(fmt::format("--filter-cutoff: {} is above 1", field.cutoff));
   field.preparation = preparation_options(args);
@@ -173,13 +144,9 @@ void add_grid(Arguments& args) {
 GridOptions grid_options(const Arguments& args, const std::string& size_option) {
   GridOptions grid;
   if (const auto size = args.sizes(size_option, 3)) grid.size = Index3{(*size)[0], (*size)[1], (*size)[2]};
-  if (args.has("spacing")) {
-    const bool both = args.text("spacing").find(',') != std::string::npos;
-    const auto spacing = *args.numbers("spacing", both ? 2 : 1);
-    if (!(spacing.front() > 0 && spacing.back() > 0))
-      throw InputError(fmt::format("--spacing: {} is not above 0", args.text("spacing")));
-    grid.spacing = spacing.front();
-    if (both) grid.spacing_z = spacing.back();
+  if (const auto spacing = args.one_or_two("spacing")) {
+    grid.spacing = (*spacing)[0];
+    grid.spacing_z = (*spacing)[1];
   }
   grid.origin = args.vec3("origin");
   return grid;
@@ -201,8 +168,7 @@ int upsampling_option(const Arguments& args) {
 RateOptions rate_options(const Arguments& args) {
   RateOptions rates;
   rates.upsampling = rate(args, "upsampling", 64);
-  rates.interpolation =
-      interpolation_of(args.choice("u-filter", {"auto", "linear", "cubic", "six-taps"}, "auto"));
+  rates.interpolation = interpolation_of(args.choice("u-filter", "auto"));
   rates.gold = rate(args, "gold", 64);
   if (args.has("paper")) {
     if (!args.has("upsampling")) rates.upsampling = 8;
@@ -218,8 +184,7 @@ void add_compression(Arguments& args) {
 }
 
 Compression compression(const Arguments& args) {
-  return args.choice("compression", {"deflate", "none"}, "deflate") == "none" ? Compression::none
-                                                                              : Compression::deflate;
+  return args.choice("compression", "deflate") == "none" ? Compression::none : Compression::deflate;
 }
 
 void add_tolerance(Arguments& args) {
@@ -264,22 +229,6 @@ Tolerance tolerance(const Arguments& args) {
   return result;
 }
 
-void add_limited(Arguments& args, const std::string& name, const std::vector<std::string>& all,
-                 const std::vector<std::string>& supported, const std::string& help) {
-  args.value(
-      name, fmt::format("{}", fmt::join(all, "|")),
-      all == supported ? help : fmt::format("{}; this version has: {}", help, fmt::join(supported, ", ")));
-}
-
-std::string limited_choice(const Arguments& args, const std::string& name,
-                           const std::vector<std::string>& all, const std::vector<std::string>& supported) {
-  std::string given = args.choice(name, all, supported.front());
-  if (std::find(supported.begin(), supported.end(), given) == supported.end())
-    throw InputError(
-        fmt::format("--{} {}: this version supports only: {}", name, given, fmt::join(supported, ", ")));
-  return given;
-}
-
 void refuse(const Arguments& args, const std::vector<std::string>& names, const std::string& reason) {
   for (const auto& name : names)
     if (args.has(name)) throw InputError(fmt::format("--{}: {}", name, reason));
@@ -291,20 +240,28 @@ void add_build(Arguments& args) {
       .value(
           "base", "auto|NxNxN",
           "cells of the grid per base sample in x, y, z: 1, 2, 4 or 8 each (default auto: what stores least)")
-      .value("window", "LO,HI", "test only where the field meets these values");
-  for (const auto& l : kBuildLimits) add_limited(args, l.name, l.all, l.supported, l.help);
-  args.flag("paper",
+      .value("window", "LO,HI", "test only where the field meets these values")
+      .value("closing", "coarse|paper|none",
+             "how bricks of different levels meet (default coarse; none is for comparison, never certified)")
+      .value("coefficients", "midrange|sampled",
+             "samples fitted to the trilinear filter, or F at the nodes (default midrange)")
+      .value("levels", "isotropic|anisotropic",
+             "one level per brick, or one per axis of a brick (default anisotropic)")
+      .value("storage", "auto|f32|u16|u8", "sample type of base and tiles (default auto)")
+      .value("terms", "all|grid",
+             "error terms that are charged (default all; grid is for comparison, never certified)")
+      .value("epsilon-of", "range|max", "what --epsilon is a fraction of (default range)")
+      .flag("paper",
             "the paper's settings, for comparison: --closing paper --coefficients sampled --granularity 4 "
             "--upsampling 8 --u-filter linear --gold 8 --terms grid --epsilon-of max, each unless given")
       .flag("resume", "continue what an interrupted build or run left in its journal");
 }
 
 BuildOptions build_options(const Arguments& args) {
-  for (const auto& l : kBuildLimits) limited_choice(args, l.name, l.all, l.supported);
   const bool paper = args.has("paper");
   BuildOptions build;
   build.scratch = common_options(args).scratch;
-  build.storage = kStorage.at(args.choice("storage", {"auto", "f32", "u16", "u8"}, paper ? "f32" : "auto"));
+  build.storage = kStorage.at(args.choice("storage", paper ? "f32" : "auto"));
   if (const auto w = args.numbers("window", 2)) {
     if (!((*w)[0] <= (*w)[1])) throw InputError(fmt::format("--window: {} lies above {}", (*w)[0], (*w)[1]));
     build.window = std::pair{(*w)[0], (*w)[1]};
@@ -334,18 +291,11 @@ std::optional<LevelTriple> coarsening(const Arguments& args) {
   return c;
 }
 
-}  // namespace
-
-namespace {
-
 /// One of `values` by its name; `fallback` where the option is not given.
 template <class T>
-T choice_of(const Arguments& args, const std::string& name, const std::vector<T>& values, T fallback) {
-  std::vector<std::string> names;
-  names.reserve(values.size());
-  for (const T value : values) names.emplace_back(text_of(value));
-  const std::string given = args.choice(name, names, text_of(fallback));
-  return values[static_cast<std::size_t>(std::find(names.begin(), names.end(), given) - names.begin())];
+T choice_of(const Arguments& args, const std::string& name, std::initializer_list<T> values, T fallback) {
+  const std::string given = args.choice(name, text_of(fallback));
+  return *std::find_if(values.begin(), values.end(), [&](T value) { return given == text_of(value); });
 }
 
 Comparison comparison(const Arguments& args) {
@@ -356,7 +306,7 @@ Comparison comparison(const Arguments& args) {
   c.terms = choice_of(args, "terms", {Terms::all, Terms::grid}, paper ? Terms::grid : Terms::all);
   c.closing = choice_of(args, "closing", {Closing::coarse, Closing::paper, Closing::none},
                         paper ? Closing::paper : Closing::coarse);
-  c.epsilon_of_max = args.choice("epsilon-of", {"range", "max"}, paper ? "max" : "range") == "max";
+  c.epsilon_of_max = args.choice("epsilon-of", paper ? "max" : "range") == "max";
   return c;
 }
 

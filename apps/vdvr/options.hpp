@@ -1,11 +1,9 @@
 // Option groups shared by several commands: declared by add_*, read by the function of the group's name.
-// What belongs to a later version is declared too, so that it is refused by name and never silently ignored.
 #pragma once
 
 #include <optional>
 
 #include "apps/common/common_options.hpp"
-#include "apps/vdvr/scan_options.hpp"
 #include "vdvr/expert/build.hpp"
 #include "vdvr/expert/certificate.hpp"
 #include "vdvr/expert/plan.hpp"
@@ -44,10 +42,5 @@ PlanSettings plan_settings(const Arguments& args);
 
 /// InputError when one of `names` was given: `reason` says why the command does not take it.
 void refuse(const Arguments& args, const std::vector<std::string>& names, const std::string& reason);
-/// Declares and checks in one place an option of which only some values exist in this version.
-void add_limited(Arguments& args, const std::string& name, const std::vector<std::string>& all,
-                 const std::vector<std::string>& supported, const std::string& help);
-std::string limited_choice(const Arguments& args, const std::string& name,
-                           const std::vector<std::string>& all, const std::vector<std::string>& supported);
 
 }  // namespace vdvr::cli

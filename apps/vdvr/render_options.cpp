@@ -7,15 +7,12 @@
 #include "apps/vdvr/crew.hpp"
 #include "apps/vdvr/options.hpp"
 #include "apps/vdvr/overlay.hpp"
-#include "apps/vdvr/volume_input.hpp"
+#include "apps/vdvr/inputs.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::cli {
 namespace {
 
-const std::vector<std::string> kOutputs{"colour", "depth", "normal", "error",  "sigma", "error-in-sigma",
-                                        "bound",  "lo",    "hi",     "middle", "class", "band"};
-const std::vector<std::string> kModes{"dvr", "iso", "mip", "integral", "slice", "error"};
 void set_background(const Arguments& args, RenderOptions& o) {
   const auto given = args.numbers("background", 0);
   if (!given) return;
@@ -46,8 +43,7 @@ void set_light(const Arguments& args, RenderOptions& o) {
 StepMode step_mode_option(const Arguments& args, const RenderOptions& o) {
   const bool can =
       o.mode == RenderMode::dvr && o.classification == Classification::post && method_option(args) != "d2vr";
-  const std::string asked =
-      args.choice("step-mode", {"adaptive", "fixed", "level"}, can ? "adaptive" : "fixed");
+  const std::string asked = args.choice("step-mode", can ? "adaptive" : "fixed");
   return asked == "adaptive" ? StepMode::adaptive : asked == "level" ? StepMode::level : StepMode::fixed;
 }
 
@@ -162,7 +158,7 @@ BrickQuantity brick_quantity(const Arguments& args) {
 
 RenderOptions render_options(const Arguments& args) {
   RenderOptions o;
-  const std::string mode = args.choice("mode", kModes, "dvr");
+  const std::string mode = args.choice("mode", "dvr");
   o.mode = mode == "iso"        ? RenderMode::iso
            : mode == "mip"      ? RenderMode::mip
            : mode == "slice"    ? RenderMode::slice
@@ -175,24 +171,19 @@ RenderOptions render_options(const Arguments& args) {
     if (o.width > 16384 || o.height > 16384) throw InputError("--size: a side is above 16384 pixels");
   }
   o.step = args.positive_or("step", o.step);
-  o.classification = args.choice("classification", {"post", "preintegrated"}, "post") == "preintegrated"
-                         ? Classification::preintegrated
-                         : Classification::post;
+  o.classification = args.choice("classification", "post") == "preintegrated" ? Classification::preintegrated
+                                                                              : Classification::post;
   o.step_mode = step_mode_option(args, o);
-  const std::string output = args.choice("show", kOutputs, "colour");
+  const std::string output = args.choice("show", "colour");
   o.output = output == "depth"                                                   ? RenderOutput::depth
              : output == "normal"                                                ? RenderOutput::normal
              : output == "error" || brick_quantity(args) != BrickQuantity::bound ? RenderOutput::error
                                                                                  : RenderOutput::colour;
   set_light(args, o);
   set_background(args, o);
-  const std::string axis = args.choice("slice-axis", {"x", "y", "z"}, "z");
-  o.slice_axis = axis[0] - 'x';
+  o.slice_axis = args.choice("slice-axis", "z")[0] - 'x';
   o.slice_position = args.number("slice-position");
-  const std::string sampler = args.choice("sampler", {"auto", "image3d", "buffer"}, "auto");
-  o.sampler = sampler == "auto"     ? SamplerKind::automatic
-              : sampler == "buffer" ? SamplerKind::buffer
-                                    : SamplerKind::image3d;
+  o.sampler = sampler_option(args);
   return o;
 }
 

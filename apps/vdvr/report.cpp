@@ -10,6 +10,7 @@
 #include "apps/vdvr/html.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/report_chart.hpp"
+#include "apps/vdvr/report_storage.hpp"
 #include "vdvr/expert/preparation.hpp"
 
 namespace vdvr::cli {
@@ -67,39 +68,14 @@ footer { margin-top: 3rem; font-size: .85rem; color: #555d68; }
 }
 )css";
 
-const char* const kGrid = "#2f6db5";
-const char* const kBetween = "#7fb0de";
-const char* const kArithmetic = "#e0a030";
-const char* const kSampler = "#8a5fb0";
-
 // --- pieces ---
 
-/// Both sides are HTML.
-struct Pair {
-  std::string name, value;
-};
-using Pairs = std::vector<Pair>;
-
 void add(Pairs& pairs, const std::string& name, const std::string& value) { pairs.push_back({name, value}); }
-
-std::string pairs_table(const Pairs& pairs) {
-  std::string html = "<table class=\"pairs\"><tbody>\n";
-  for (const auto& [name, value] : pairs)
-    html += fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td></tr>\n", name, value);
-  return html + "</tbody></table>\n";
-}
 
 std::string list(const std::vector<std::string>& notes) {
   std::string html = "<ul>\n";
   for (const std::string& note : notes) html += fmt::format("<li>{}</li>\n", escaped(with_options(note)));
   return html + "</ul>\n";
-}
-
-std::string code(const std::string& text) { return fmt::format("<code>{}</code>", escaped(text)); }
-
-std::string percent(double value, double whole) {
-  return fmt::format("{}\xE2\x80\xAF%",
-                     whole > 0 ? fmt::format("{:.3g}", 100 * value / whole) : "\xE2\x80\x93");
 }
 
 std::string point_text(const Vec3& p, const std::string& unit) {
@@ -291,16 +267,13 @@ std::string bars(const RunReport& run) {
 }
 
 std::string terms(const Certificate& c) {
-  std::string html =
-      "<h3>The largest of each term</h3>\n<table><thead><tr><th>term, and how it was found</th><th "
-      "class=\"n\">density units</th><th class=\"n\">share</th><th></th></tr></thead><tbody>\n";
+  std::string html = "<h3>The largest of each term</h3>\n" +
+                     table_head({"term, and how it was found", "density units", "share"}, /*bars=*/true);
   const auto row = [&](const std::string& name, const ErrorTerm& t, const std::string& member,
                        const char* color) {
-    html += fmt::format(
-        "<tr><th scope=\"row\">{}<small>{}</small></th><td class=\"n\">{}</td><td class=\"n\">{}</td><td "
-        "class=\"b\">{}</td></tr>\n",
-        name, escaped(t.method), number_html(t.value, "budget." + member + ".value"),
-        percent(t.value, c.epsilon_abs), stacked_bar({{name, color, t.value}}, c.epsilon_abs, 0, name));
+    html += table_row(fmt::format("{}<small>{}</small>", name, escaped(t.method)),
+                      {number_html(t.value, "budget." + member + ".value"), percent(t.value, c.epsilon_abs)},
+                      stacked_bar({{name, color, t.value}}, c.epsilon_abs, 0, name));
   };
   row("grid", c.budget.grid, "grid", kGrid);
   row("gold", c.budget.gold, "gold", kBetween);
@@ -309,27 +282,24 @@ std::string terms(const Certificate& c) {
   row("sampler buffer", c.budget.sampler.buffer, "sampler.buffer", kSampler);
   if (c.budget.sampler.image3d)
     row("sampler image3d", *c.budget.sampler.image3d, "sampler.image3d", kSampler);
-  return html +
-         "</tbody></table>\n<p class=\"note\">They do not peak at one point, and so do not add up to the "
+  return html + table_end +
+         "<p class=\"note\">They do not peak at one point, and so do not add up to the "
          "total.</p>\n";
 }
 
 std::string verification(const RunReport& run) {
   const Certificate& c = run.certificate;
   const VerifyResult& v = run.verified;
-  std::string html =
-      "<h3>Measured again</h3>\n<table><thead><tr><th>density units</th><th class=\"n\">certified</th><th "
-      "class=\"n\">measured</th></tr></thead><tbody>\n";
+  std::string html = "<h3>Measured again</h3>\n" + table_head({"density units", "certified", "measured"});
   const auto row = [&](const std::string& name, const std::string& certified, double measured) {
-    html += fmt::format("<tr><th scope=\"row\">{}</th><td class=\"n\">{}</td><td class=\"n\">{}</td></tr>\n",
-                        name, certified, number_html(measured));
+    html += table_row(name, {certified, number_html(measured)});
   };
   row("|V \xE2\x88\x92 F| at nodes", number_html(c.measured_max, "measured_max"), v.measured_max);
   row("and between them", number_html(c.measured_total, "measured_total"), v.measured_total);
   row("total, sampler buffer", number_html(c.total_buffer), v.total_buffer);
   if (c.total_image3d && v.total_image3d)
     row("total, sampler image3d", number_html(*c.total_image3d), *v.total_image3d);
-  html += "</tbody></table>\n";
+  html += table_end;
   html += fmt::format(
       "<p class=\"note\"><code>verify</code> looked at {} of {} bricks, {} gold cells and {} gold nodes, by "
       "a path of "
@@ -340,115 +310,6 @@ std::string verification(const RunReport& run) {
       count_html(static_cast<std::uint64_t>(v.nodes_tested)), v.holds ? "holds" : "does not hold",
       point_text(v.worst_at, run.volume.grid.unit));
   return html;
-}
-
-// --- storage ---
-
-struct LevelRow {
-  LevelTriple level{};
-  std::uint64_t bricks = 0, samples = 0;
-};
-
-/// The bricks that read the base first, then by samples stored.
-std::vector<LevelRow> level_rows(const MixedVolume& volume) {
-  std::map<LevelTriple, LevelRow> found;
-  for (const LevelTriple& level : volume.level) {
-    LevelRow& row = found[level];
-    row.level = level;
-    ++row.bricks;
-  }
-  found[LevelTriple{}].samples = volume.base.size();
-  for (const auto& [kind, block] : volume.tiles) found[kind.level].samples += block.size();
-  std::vector<LevelRow> rows;
-  for (const auto& [level, row] : found) rows.push_back(row);
-  std::sort(rows.begin() + 1, rows.end(), [](const auto& a, const auto& b) { return a.samples > b.samples; });
-  return rows;
-}
-
-/// A sample every so many cells, x, y, z.
-std::string level_text(const MixedVolume& volume, const LevelTriple& level) {
-  const auto every = [&](std::size_t axis) { return std::ldexp(1.0, volume.coarsening[axis] - level[axis]); };
-  return fmt::format("{} \xC3\x97 {} \xC3\x97 {}", every(2), every(1), every(0));
-}
-
-/// The last row of `rows` becomes the sum of all from there on; how many these are.
-std::size_t merge_rest(std::vector<LevelRow>& rows) {
-  constexpr std::size_t most = 12;
-  if (rows.size() <= most) return 0;
-  const std::size_t others = rows.size() - most + 1;
-  for (std::size_t i = most; i < rows.size(); ++i) {
-    rows[most - 1].bricks += rows[i].bricks;
-    rows[most - 1].samples += rows[i].samples;
-  }
-  rows.resize(most);
-  return others;
-}
-
-std::string histogram(const MixedVolume& volume) {
-  std::vector<LevelRow> rows = level_rows(volume);
-  const std::size_t others = merge_rest(rows);
-  std::uint64_t largest = 1;
-  for (const LevelRow& row : rows) largest = std::max(largest, row.samples);
-  std::string html = fmt::format(
-      "<h3>Levels</h3>\n<table><thead><tr><th>a sample every x \xC3\x97 y \xC3\x97 z cells</th><th "
-      "class=\"n\">bricks</th><th "
-      "class=\"n\">samples</th><th></th></tr></thead><tbody>\n");
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    const bool rest = others > 0 && i + 1 == rows.size();
-    const std::string name = rest     ? fmt::format("{} other levels", others)
-                             : i == 0 ? level_text(volume, rows[i].level) + " (the base)"
-                                      : level_text(volume, rows[i].level);
-    html += fmt::format(
-        "<tr><th scope=\"row\">{}</th><td class=\"n\">{}</td><td class=\"n\">{}</td><td "
-        "class=\"b\">{}</td></tr>\n",
-        name, count_html(rows[i].bricks), count_html(rows[i].samples),
-        stacked_bar({{name, kGrid, static_cast<double>(rows[i].samples)}}, static_cast<double>(largest), 0,
-                    name + ": samples"));
-  }
-  return html + fmt::format(
-                    "</tbody></table>\n<p class=\"note\">A brick has {0} \xC3\x97 {0} \xC3\x97 {0} cells. "
-                    "The base has samples "
-                    "everywhere; bricks of other levels have their own beside it.</p>\n",
-                    volume.granularity);
-}
-
-std::string storage(const RunReport& run) {
-  const MixedVolume& volume = run.volume;
-  const Storage all = storage_of(volume, false), interior = storage_of(volume, true);
-  const auto samples = static_cast<std::uint64_t>(volume.grid.sample_count());
-  const std::uint64_t bytes = samples * sizeof(float);
-  const auto stored =
-      static_cast<std::uint64_t>(std::llround(all.samples_ratio * static_cast<double>(samples)));
-  std::string html =
-      "<section>\n<h2>Storage</h2>\n<table><thead><tr><th></th><th class=\"n\">uniform float32 grid</th><th "
-      "class=\"n\">certified volume</th><th class=\"n\">ratio</th></tr></thead><tbody>\n";
-  const auto row = [&](const std::string& name, const std::string& uniform, const std::string& ours,
-                       double ratio) {
-    html += fmt::format(
-        "<tr><th scope=\"row\">{}</th><td class=\"n\">{}</td><td class=\"n\">{}</td><td "
-        "class=\"n\">{}</td></tr>\n",
-        name, uniform, ours, percent(ratio, 1));
-  };
-  row("samples, with the index", count_html(samples), count_html(stored), all.samples_ratio);
-  row("bytes on the device", bytes_text(bytes), bytes_text(all.device_bytes), all.bytes_ratio);
-  row("bytes in the file", bytes_text(bytes), bytes_text(run.file_bytes),
-      static_cast<double>(run.file_bytes) / static_cast<double>(bytes));
-  html += "</tbody></table>\n";
-  const double full = static_cast<double>(bytes);
-  html += fmt::format(
-      "<div class=\"row\"><span>uniform float32 grid</span><span>{}</span></div>{}\n", bytes_text(bytes),
-      stacked_bar({{"uniform float32 grid", "#9aa3ad", full}}, full, 0, "uniform float32 grid"));
-  html +=
-      fmt::format("<div class=\"row\"><span>certified volume on the device</span><span>{}</span></div>{}\n",
-                  bytes_text(all.device_bytes),
-                  stacked_bar({{"certified volume", kGrid, static_cast<double>(all.device_bytes)}}, full, 0,
-                              "certified volume on the device"));
-  html += fmt::format(
-      "<p class=\"note\">Of the interior, without the empty rim: {} of the samples, {} of the bytes. The "
-      "uniform "
-      "grid alone carries no certificate.</p>\n",
-      percent(interior.samples_ratio, 1), percent(interior.bytes_ratio, 1));
-  return html + histogram(volume) + "</section>\n";
 }
 
 // --- settings and input ---
@@ -542,12 +403,10 @@ std::string timings(const RunReport& run) {
     largest = std::max(largest, s);
   }
   std::string html =
-      "<section>\n<h2>Time and device</h2>\n<table><thead><tr><th>stage</th><th "
-      "class=\"n\">seconds</th><th></th></tr></thead><tbody>\n";
+      "<section>\n<h2>Time and device</h2>\n" + table_head({"stage", "seconds"}, /*bars=*/true);
   const auto row = [&](const std::string& name, double s, const char* color) {
-    html += fmt::format(
-        "<tr><th scope=\"row\">{}</th><td class=\"n\">{:.2f} s</td><td class=\"b\">{}</td></tr>\n",
-        escaped(name), s, stacked_bar({{name, color, s}}, largest, 0, name));
+    html += table_row(escaped(name), {fmt::format("{:.2f} s", s)},
+                      stacked_bar({{name, color, s}}, largest, 0, name));
   };
   for (const auto& [stage, s] : run.seconds) {
     row(stage, s, kGrid);
@@ -589,8 +448,8 @@ std::string report_page(const RunReport& run) {
          "</style>\n</head>\n<body>\n<main>\n" + head(run) + pictures(run) +
          "<section>\n<h2>The certificate</h2>\n" + promised(run) + not_promised(run) +
          "</section>\n<section>\n<h2>Shares of the tolerance</h2>\n" + bars(run) + terms(run.certificate) +
-         verification(run) + "</section>\n" + storage(run) + settings(run) + input(run) + timings(run) +
-         again(run) + "<footer>Written by vdvr " + escaped(run.certificate.version) +
+         verification(run) + "</section>\n" + storage_section(run) + settings(run) + input(run) +
+         timings(run) + again(run) + "<footer>Written by vdvr " + escaped(run.certificate.version) +
          ". What is promised stands in certificate.json and in volume.vdvr; this page repeats "
          "it.</footer>\n</main>\n</body>\n</html>\n";
 }

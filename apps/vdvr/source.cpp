@@ -33,11 +33,6 @@ void print_paging(const std::optional<PagingCounts>& counts) {
              static_cast<double>(counts->bytes) / (1 << 20));
 }
 
-const std::vector<std::string>& render_methods() {
-  static const std::vector<std::string> names{"vdvr", "dvr", "d2vr"};
-  return names;
-}
-
 void add_method(Arguments& args) {
   args.value(
       "method", "vdvr|dvr|d2vr",
@@ -59,7 +54,7 @@ void add_projection_options(Arguments& args) {
 }
 
 std::string method_option(const Arguments& args) {
-  std::string method = args.choice("method", render_methods(), "vdvr");
+  std::string method = args.choice("method", "vdvr");
   if (method != "d2vr") refuse(args, kProjectionOptions, "applies to --method d2vr");
   return method;
 }

@@ -6,12 +6,14 @@
 #include <string>
 #include <vector>
 
-#include "apps/vdvr/pictures.hpp"
+#include "apps/vdvr/inputs.hpp"
+#include "vdvr/expert/certify_picture.hpp"
 #include "vdvr/expert/d2vr.hpp"
 #include "vdvr/expert/drawn_volume.hpp"
 #include "vdvr/expert/error_slice.hpp"
 #include "vdvr/expert/paged_volume.hpp"
 #include "vdvr/expert/progress.hpp"
+#include "vdvr/expert/render_crew.hpp"
 #include "vdvr/expert/safe_sampler.hpp"
 
 namespace vdvr::cli {
@@ -21,7 +23,6 @@ Json paging_json(const std::optional<PagingCounts>& counts);
 /// A line, or none.
 void print_paging(const std::optional<PagingCounts>& counts);
 
-const std::vector<std::string>& render_methods();
 void add_method(Arguments& args);
 /// A group of the options that only d2vr has, without the scan's (add_scan).
 void add_projection_options(Arguments& args);

@@ -108,7 +108,7 @@ void add_frame(Arguments& args) {
 }
 
 bool frames_grid(const Arguments& args) {
-  return args.choice("frame", {"shown", "grid"}, args.has("box") ? "grid" : "shown") == "grid";
+  return args.choice("frame", args.has("box") ? "grid" : "shown") == "grid";
 }
 
 OrbitFrame frame_for(const Arguments& args, const MixedVolume& volume, const RenderOptions& o,
@@ -126,6 +126,17 @@ Camera camera_for(const Arguments& args, const OrbitFrame& frame, const Orbit& o
                  args.positive_or("camera-view-angle", camera.view_angle_deg));
 }
 
+const char* sampler_name(SamplerKind kind) {
+  return kind == SamplerKind::image3d ? "image3d" : kind == SamplerKind::buffer ? "buffer" : "auto";
+}
+
+SamplerKind sampler_option(const Arguments& args) {
+  const std::string asked = args.choice("sampler", "auto");
+  return asked == "auto"     ? SamplerKind::automatic
+         : asked == "buffer" ? SamplerKind::buffer
+                             : SamplerKind::image3d;
+}
+
 constexpr std::array<std::pair<const char*, GradientKind>, 4> kGradients{
     {{"auto", GradientKind::automatic},
      {"central", GradientKind::central},
@@ -133,10 +144,7 @@ constexpr std::array<std::pair<const char*, GradientKind>, 4> kGradients{
      {"analytic", GradientKind::analytic}}};
 
 GradientKind gradient_option(const Arguments& args) {
-  std::vector<std::string> names;
-  names.reserve(kGradients.size());
-  for (const auto& [name, kind] : kGradients) names.emplace_back(name);
-  const std::string asked = args.choice("gradient", names, "auto");
+  const std::string asked = args.choice("gradient", "auto");
   return std::find_if(kGradients.begin(), kGradients.end(), [&](const auto& g) { return asked == g.first; })
       ->second;
 }

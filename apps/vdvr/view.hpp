@@ -5,8 +5,10 @@
 #include <optional>
 #include <utility>
 
-#include "apps/vdvr/pictures.hpp"
+#include "apps/vdvr/inputs.hpp"
+#include "vdvr/automatic_view.hpp"
 #include "vdvr/expert/framing.hpp"
+#include "vdvr/raycast.hpp"
 
 namespace vdvr::cli {
 
@@ -21,7 +23,9 @@ std::optional<std::pair<double, double>> given_range(const Arguments& args);
 /// Opacities are those of one base cell of the grid. What a reader filled in stands in `note`.
 TransferFunction transfer_for(const Arguments& args, const Brightness& brightness, const Grid& grid);
 
-/// From --gradient.
+/// From --sampler and --gradient.
+const char* sampler_name(SamplerKind kind);
+SamplerKind sampler_option(const Arguments& args);
 GradientKind gradient_option(const Arguments& args);
 const char* gradient_name(GradientKind kind);
 

@@ -30,8 +30,7 @@ ExportFormat output_format(const Arguments& args, const fs::path& output) {
         "slices, or say --format",
         output.string()));
   }
-  const std::string text =
-      args.choice("format", {"mha", "nrrd", "tiff", "hdf5", "npy", "raw", "ome-zarr", "vtm"}, "mha");
+  const std::string text = args.choice("format", "mha");
   for (const ExportFormat f :
        {ExportFormat::mha, ExportFormat::nrrd, ExportFormat::tiff, ExportFormat::hdf5, ExportFormat::npy,
         ExportFormat::raw, ExportFormat::ome_zarr, ExportFormat::vtm})
@@ -53,10 +52,10 @@ ExportOptions volume_output_options(const Arguments& args, const CommonOptions& 
     throw InputError(fmt::format("--compression is for hdf5, ome-zarr and vtm, not for {}", text_of(format)));
   ExportOptions o;
   o.format = format;
-  const std::string samples = args.choice("samples", {"f32", "u16", "u8"}, "f32");
+  const std::string samples = args.choice("samples", "f32");
   o.samples = samples == "u8" ? SampleType::u8 : samples == "u16" ? SampleType::u16 : SampleType::f32;
   if (const auto range = args.numbers("range", 2)) o.range = {(*range)[0], (*range)[1]};
-  if (args.choice("compression", {"none", "deflate"}, "deflate") == "none") o.compression = Compression::none;
+  if (args.choice("compression", "deflate") == "none") o.compression = Compression::none;
   o.max_memory_bytes = common.max_memory;
   return o;
 }

@@ -36,9 +36,7 @@ std::string plan_digest(const ProjectionSet& scan, const Plan& plan) {
   return sha.hex();
 }
 
-namespace {
-
-const char* name(StorageChoice storage) {
+const char* text_of(StorageChoice storage) {
   switch (storage) {
     case StorageChoice::f32:
       return "f32";
@@ -50,6 +48,8 @@ const char* name(StorageChoice storage) {
       return "auto";
   }
 }
+
+namespace {
 
 std::string joined(const std::vector<Crew::Kind>& devices, std::string DeviceInfo::*what) {
   std::string text;
@@ -87,7 +87,7 @@ JournalHead journal_head(const std::vector<Crew::Kind>& devices, const Projectio
       {"base", fmt::format("{}", fmt::join(plan.layout.coarsening, ","))},
       {"granularity", std::to_string(stream.settings().granularity)},
       {"closing", text_of(plan.settings.comparison.closing)},
-      {"storage", name(options.storage)},
+      {"storage", text_of(options.storage)},
       {"window",
        options.window ? exact_list(std::array{options.window->first, options.window->second}) : "none"},
       {"roi", options.roi ? exact_list(*options.roi) : "none"},

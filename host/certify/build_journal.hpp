@@ -9,6 +9,9 @@
 
 namespace vdvr {
 
+/// "auto", "f32", "u16", "u8".
+const char* text_of(StorageChoice storage);
+
 /// The plan is made again by a resumed process: this stands for it, before its base samples are given away.
 std::string plan_digest(const ProjectionSet& scan, const Plan& plan);
 /// `tolerance`: what the first attempt leaves for |V - gold| + T + P.

@@ -8,31 +8,18 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "host/field/fdk/filter_cone.hpp"
+#include "host/certify/build_journal.hpp"
 #include "host/certify/gold/gold_settings.hpp"
-#include "host/scan/input_statement_json.hpp"
+#include "host/field/fdk/filter_cone.hpp"
 #include "host/volume/covered_range.hpp"
 #include "vdvr/expert/certified_region.hpp"
+#include "host/scan/input_statement_json.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/region_of_interest.hpp"
 #include "vdvr/vdvr_file.hpp"
 
 namespace vdvr {
 namespace {
-
-const char* text_of(StorageChoice storage) {
-  switch (storage) {
-    case StorageChoice::f32:
-      return vdvr::text_of(SampleType::f32);
-    case StorageChoice::u16:
-      return vdvr::text_of(SampleType::u16);
-    case StorageChoice::u8:
-      return vdvr::text_of(SampleType::u8);
-    case StorageChoice::automatic:
-      break;
-  }
-  return "auto";
-}
 
 // What the stages below take for granted of one another.
 void check_options(const CertifyOptions& options) {
@@ -83,14 +70,14 @@ std::string options_json(const Plan& plan, const CertifyOptions& options, const 
   nlohmann::ordered_json j;
   j["granularity"] = plan.layout.granularity;
   j["base"] = std::array{1 << c[2], 1 << c[1], 1 << c[0]};  // cells per base sample, x, y, z
-  j["closing"] = vdvr::text_of(comparison.closing);
-  j["coefficients"] = vdvr::text_of(comparison.coefficients);
-  j["levels"] = vdvr::text_of(plan.layout.levels);
+  j["closing"] = text_of(comparison.closing);
+  j["coefficients"] = text_of(comparison.coefficients);
+  j["levels"] = text_of(plan.layout.levels);
   j["storage"] = text_of(options.build.storage);
-  j["terms"] = vdvr::text_of(comparison.terms);
+  j["terms"] = text_of(comparison.terms);
   j["epsilon_of"] = comparison.epsilon_of_max ? "max" : "range";
   j["upsampling"] = plan.rates.upsampling;
-  j["u_filter"] = vdvr::text_of(plan.rates.interpolation);
+  j["u_filter"] = text_of(plan.rates.interpolation);
   j["gold"] = plan.rates.gold;
   if (!options.input.none()) j["input"] = json_of(options.input);
   j["geometry"] = {{"columns", geometry.columns},
@@ -102,7 +89,7 @@ std::string options_json(const Plan& plan, const CertifyOptions& options, const 
                    {"theta_rad", geometry.theta_rad}};
   if (!scan.cone) return j.dump();
   nlohmann::ordered_json& cone = j["geometry"]["cone"];
-  cone["redundancy"] = vdvr::text_of(scan.cone->redundancy);
+  cone["redundancy"] = text_of(scan.cone->redundancy);
   for (const ViewMatrix& matrix : scan.cone->views)
     for (std::size_t row = 0; row < 3; ++row)
       for (const double m : matrix[row]) cone["matrices"].push_back(m);  // one after another

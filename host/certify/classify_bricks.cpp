@@ -174,9 +174,10 @@ void ClassifyBricks::take_slack(const BrickMeasure& m) {
 }
 
 std::vector<std::int64_t> ClassifyBricks::take_tiles(ByteReader& in) {
-  auto bricks = in.get_vector<std::int64_t>();
-  const auto levels = in.get_vector<LevelTriple>();
-  const auto samples = in.get_vector<float>();
+  std::vector<std::int64_t> bricks;
+  std::vector<LevelTriple> levels;
+  std::vector<float> samples;
+  in(bricks, levels, samples);
   const float* next = samples.data();
   const float* const end = next + samples.size();
   const MixedVolume shape = bricks_.shape();
@@ -201,7 +202,7 @@ void ClassifyBricks::extract(const std::vector<std::uint8_t>& raised) {
   fine_.run(
       std::move(pass), nullptr,
       [&](ByteReader in) {
-        for (const std::int64_t brick : take_tiles(in)) along_[at(brick)] = get_along(in);
+        for (const std::int64_t brick : take_tiles(in)) along_[at(brick)] = in.get<AxisErrors>();
       },
       progress_, "repair");
 }
@@ -217,7 +218,7 @@ void ClassifyBricks::measure_at(JournalledGold& gold, const DeviceField& field,
   gold.run(
       std::move(pass), &field,
       [&](ByteReader in) {
-        while (!in.empty()) visit(get_measure(in));
+        while (!in.empty()) visit(in.get<BrickMeasure>());
       },
       progress_, stage);
 }

@@ -46,10 +46,6 @@ SigmaRange range_of(const Volume& sigma, const std::vector<std::uint8_t>& seen) 
 
 }  // namespace
 
-SigmaRange sigma_range(const Volume& sigma, const ProjectionSet& scan, const FieldOptions& field) {
-  return range_of(sigma, seen_samples(sigma, scan, field));
-}
-
 BrickSigma brick_sigma(const Volume& sigma, const ProjectionSet& scan, const FieldOptions& field,
                        const Grid& grid, int granularity) {
   const std::vector<std::uint8_t> seen = seen_samples(sigma, scan, field);

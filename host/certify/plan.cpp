@@ -12,7 +12,9 @@
 #include <numbers>
 #include <utility>
 
+#include "host/certify/bounds/amplitude_bounds.hpp"
 #include "host/certify/bounds/paper_bounds.hpp"
+#include "host/volume/covered_range.hpp"
 #include "host/certify/choose_coarsening.hpp"
 #include "host/certify/choose_rates.hpp"
 #include "host/certify/foresee.hpp"
@@ -26,7 +28,6 @@
 #include "host/scan/row_window.hpp"
 #include "host/base/system/casts.hpp"
 #include "host/volume/bricks.hpp"
-#include "host/volume/covered_range.hpp"
 #include "host/volume/validate_volume.hpp"
 #include "vdvr/error.hpp"
 
@@ -326,7 +327,6 @@ class Planner {
     plan_.samples_ratio = foreseen.samples_ratio;
     const double probing = seconds_of([&] { probe_filters(device_); });  // as build will
     plan_.seconds_of_rows = preparation_ + foreseen.kept_seconds;
-    plan_.seconds_of_levels = foreseen.seconds - foreseen.kept_seconds;
     plan_.seconds =
         preparation_ + fitting * all / std::max(1.0, size(looked_at)) + foreseen.seconds + probing;
     foresee_memory(foreseen, gold.fine().source()->kept);
@@ -360,10 +360,6 @@ class Planner {
   std::vector<std::uint8_t> looked_at_;
   bool estimates_views_ = false;
 };
-
-}  // namespace
-
-namespace {
 
 // A scan of more samples is judged from a window of its rows.
 constexpr std::int64_t most_samples_planned = std::int64_t{8} << 20;

@@ -21,6 +21,7 @@
 #include "host/base/system/casts.hpp"
 #include "host/base/system/limits.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/base/system/lower.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/export_vtk.hpp"
 
@@ -234,9 +235,7 @@ const char* text_of(ExportFormat format) {
 }
 
 std::optional<ExportFormat> export_format_of(const fs::path& path) {
-  std::string e = without_slash(path).extension().string();
-  std::transform(e.begin(), e.end(), e.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string e = lower_extension(without_slash(path));
   if (e == ".mha") return ExportFormat::mha;
   if (e == ".nrrd") return ExportFormat::nrrd;
   if (e == ".npy") return ExportFormat::npy;

@@ -161,39 +161,44 @@ SlicePlace place_of(const SliceFrame& frame, const ErrorSliceOptions& o) {
   return {0, 0, o.width, o.height, false};
 }
 
-/// Compares every pixel and colours it.
-void compare(ErrorSlice& result, const PixelGrid& pixels, const Axes& axes, const Volume& f,
-             const ProjectionSet& scan, const MixedVolume& volume, const Certificate& c) {
-  const CertifiedRegion region(scan, c.field);
-  const Index3 samples = pixels.grid.samples();
-  const std::int64_t left = (result.image.width - pixels.width) / 2;
-  const std::int64_t top = (result.image.height - pixels.height) / 2;
-  for (std::int64_t y = 0; y < pixels.height; ++y) {
+/// Calls for every pixel with its place in the picture, and with the sample and the point that it shows.
+template <class Look>
+void for_pixels(const ErrorSlice& result, const PixelGrid& pixels, const Axes& axes, Look&& look) {
+  const std::int64_t left = (result.image.width - pixels.width) / 2,
+                     top = (result.image.height - pixels.height) / 2;
+  for (std::int64_t y = 0; y < pixels.height; ++y)
     for (std::int64_t x = 0; x < pixels.width; ++x) {
       Index3 at{};
       at[axes.across] = x;
       at[axes.down] = y;
       at[axes.normal] = static_cast<std::int64_t>(pixels.plane);
-      const Vec3 point = pixels.grid.position(at);
-      const double truth = static_cast<double>(
-          f.samples[static_cast<std::size_t>((at[2] * samples[1] + at[1]) * samples[0] + at[0])]);
-      const bool compared = region.contains(point) && is_inside(c.roi, point) &&
-                            (!c.window || (truth >= c.window->first && truth <= c.window->second));
-      if (!compared) {
-        put(result.image, left + x, top + y, kNotCompared);
-        continue;
-      }
-      const double error = std::abs(static_cast<double>(sample_at(volume, point)) - truth);
-      ++result.pixels;
-      result.errors.values[static_cast<std::size_t>((top + y) * result.errors.width + left + x)] =
-          static_cast<float>(error);
-      if (std::isnan(error) || error > result.max_error) {  // a NaN stays the largest
-        result.max_error = error;
-      }
-      const bool within = error <= c.epsilon_abs;
-      put(result.image, left + x, top + y, within ? error_colour(error / c.epsilon_abs) : kAbove);
+      look(left + x, top + y, at, pixels.grid.position(at));
     }
-  }
+}
+
+/// Compares every pixel and colours it.
+void compare(ErrorSlice& result, const PixelGrid& pixels, const Axes& axes, const Volume& f,
+             const ProjectionSet& scan, const MixedVolume& volume, const Certificate& c) {
+  const CertifiedRegion region(scan, c.field);
+  const Index3 samples = pixels.grid.samples();
+  for_pixels(result, pixels, axes, [&](std::int64_t x, std::int64_t y, const Index3& at, const Vec3& point) {
+    const double truth = static_cast<double>(
+        f.samples[static_cast<std::size_t>((at[2] * samples[1] + at[1]) * samples[0] + at[0])]);
+    const bool compared = region.contains(point) && is_inside(c.roi, point) &&
+                          (!c.window || (truth >= c.window->first && truth <= c.window->second));
+    if (!compared) {
+      put(result.image, x, y, kNotCompared);
+      return;
+    }
+    const double error = std::abs(static_cast<double>(sample_at(volume, point)) - truth);
+    ++result.pixels;
+    result.errors.values[static_cast<std::size_t>(y * result.errors.width + x)] = static_cast<float>(error);
+    if (std::isnan(error) || error > result.max_error) {  // a NaN stays the largest
+      result.max_error = error;
+    }
+    const bool within = error <= c.epsilon_abs;
+    put(result.image, x, y, within ? error_colour(error / c.epsilon_abs) : kAbove);
+  });
 }
 
 }  // namespace
@@ -300,26 +305,18 @@ ErrorSlice bound_slice(const MixedVolume& volume, const Certificate& c, bool ima
   const PixelGrid pixels = pixel_grid(volume.grid, options, place);
   const Axes axes = axes_of(options.axis);
   ErrorSlice result = empty_slice(place);
-  const std::int64_t left = (result.image.width - pixels.width) / 2;
-  const std::int64_t top = (result.image.height - pixels.height) / 2;
-  for (std::int64_t y = 0; y < pixels.height; ++y)
-    for (std::int64_t x = 0; x < pixels.width; ++x) {
-      Index3 at{};
-      at[axes.across] = x;
-      at[axes.down] = y;
-      at[axes.normal] = static_cast<std::int64_t>(pixels.plane);
-      const Vec3 point = pixels.grid.position(at);
-      const Index3 brick = brick_at(volume, point);
-      const float value =
-          is_inside(c.roi, point)
-              ? shown.values[static_cast<std::size_t>((brick[2] * n[1] + brick[1]) * n[0] + brick[0])]
-              : std::numeric_limits<float>::infinity();
-      put(result.image, left + x, top + y, value_colour(value, shown.end));
-      if (!std::isfinite(value)) continue;
-      ++result.pixels;
-      result.max_error = std::max(result.max_error, static_cast<double>(value));
-      result.errors.values[static_cast<std::size_t>((top + y) * result.errors.width + left + x)] = value;
-    }
+  for_pixels(result, pixels, axes, [&](std::int64_t x, std::int64_t y, const Index3&, const Vec3& point) {
+    const Index3 brick = brick_at(volume, point);
+    const float value =
+        is_inside(c.roi, point)
+            ? shown.values[static_cast<std::size_t>((brick[2] * n[1] + brick[1]) * n[0] + brick[0])]
+            : std::numeric_limits<float>::infinity();
+    put(result.image, x, y, value_colour(value, shown.end));
+    if (!std::isfinite(value)) return;
+    ++result.pixels;
+    result.max_error = std::max(result.max_error, static_cast<double>(value));
+    result.errors.values[static_cast<std::size_t>(y * result.errors.width + x)] = value;
+  });
   const std::string sampler = quantity == BrickQuantity::sigma
                                   ? ""
                                   : fmt::format(" where covered, sampler {}", image3d ? "image3d" : "buffer");

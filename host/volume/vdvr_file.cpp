@@ -378,15 +378,21 @@ std::string read_altered(const h5::Reader& file, VdvrFile& result) {
       altered, altered.empty() ? "" : "; ", found, result.certificate.content_sha256);
 }
 
-VdvrFile read_whole(const std::filesystem::path& path, Reading reading) {
-  const h5::Reader file(path, h5::Links::hard);
-  VdvrFile result;
+/// Everything before the certificate and the samples.
+Contents read_head(const h5::Reader& file, VdvrFile& result) {
   result.file_bytes = file.file_bytes();
   result.format_version = read_version(file);
   result.generator = file.text_attribute("/", "generator");
   read_grid(file, result.format_version, result.volume);
-  const Contents contents = open_contents(file, result.volume);
+  Contents contents = open_contents(file, result.volume);
   read_step(file, contents, result.volume);
+  return contents;
+}
+
+VdvrFile read_whole(const std::filesystem::path& path, Reading reading) {
+  const h5::Reader file(path, h5::Links::hard);
+  VdvrFile result;
+  const Contents contents = read_head(file, result);
   choose_scratch(contents, reading);
   check_memory(file, path.string(), contents, reading);
   result.certificate = read_certificate(file, path.string(), result.certificate_json);
@@ -450,12 +456,7 @@ VdvrParts open_parts(const std::filesystem::path& path, std::uint64_t max_memory
   const h5::Reader& file = *parts.reader;
   VdvrFile& result = parts.file;
   MixedVolume& v = result.volume;
-  result.file_bytes = file.file_bytes();
-  result.format_version = read_version(file);
-  result.generator = file.text_attribute("/", "generator");
-  read_grid(file, result.format_version, v);
-  Contents contents = open_contents(file, v);
-  read_step(file, contents, v);
+  Contents contents = read_head(file, result);
   result.certificate = read_certificate(file, path.string(), result.certificate_json);
   read_index(file, contents, v);
   v.base.type = type_of(contents.base);

@@ -3,6 +3,7 @@
 
 #include <random>
 
+#include "host/certify/bounds/amplitude_bounds.hpp"
 #include "host/field/fbp/view_weights.hpp"
 #include "tests/support/attack_chain.hpp"
 #include "tests/support/attack_scans.hpp"

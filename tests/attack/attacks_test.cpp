@@ -5,6 +5,7 @@
 #include <numbers>
 #include <random>
 
+#include "host/certify/bounds/amplitude_bounds.hpp"
 #include "host/certify/bounds/six_taps.hpp"
 #include "host/field/fbp/reconstruct.hpp"
 #include "host/volume/sampler/sampler_terms.hpp"

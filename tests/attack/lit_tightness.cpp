@@ -1,6 +1,6 @@
 // How tight intervals of lit pixels are: the error of V's picture under its own light beside the bound, and
 // beside what an adversary reaches who chooses values and differences within their bounds, on fields with an
-// analytic F (docs/pixel-bounds.md, section 7). scripts/lit-tightness makes the table.
+// analytic F (docs/pixel-bounds.md, section 7). scripts/long lit-tightness makes the table.
 //   lit_tightness FIELD CELLS LEVEL
 // FIELD: marschner-lobb or blobs; LEVEL: samples 2^LEVEL to a cell.
 

@@ -1,6 +1,6 @@
 // Ideal pictures under the light of F itself: every pixel of fields with an analytic F inside its interval,
 // and what an adversary within the bounds makes too. VDVR_TRUTH_FIELDS asks for more fields than the few of
-// every day (scripts/pixel-truth).
+// every day (scripts/long pixel-truth).
 #define BOOST_TEST_MODULE lit_truth
 #include <boost/test/unit_test.hpp>
 

@@ -1,6 +1,6 @@
 // Intervals of pixels under attack: random fields, levels, bases, integers, transfer functions, cameras,
 // bounds and clips, and fields f that keep the bounds. VDVR_PIXEL_PICTURES asks for more pictures than the
-// few of every day (scripts/pixel-attacks).
+// few of every day (scripts/long pixel-attacks).
 #define BOOST_TEST_MODULE pixel_attack
 #include <boost/test/unit_test.hpp>
 

@@ -1,6 +1,6 @@
 // How tight intervals of pixels are: beside the true error of V's picture, and beside what an adversary
 // within the bounds reaches, on fields with an analytic F (docs/pixel-bounds.md, section 10). One row of a
-// table for each field and transfer function. scripts/pixel-tightness makes the table.
+// table for each field and transfer function. scripts/long pixel-tightness makes the table.
 //   pixel_tightness FIELD CELLS LEVEL [ADVERSARY-EVERY]
 // FIELD: marschner-lobb or blobs; LEVEL: samples 2^LEVEL to a cell; the adversary takes every so manieth
 // pixel of a row and of a column (4; 0: none).

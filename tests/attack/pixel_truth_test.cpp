@@ -1,6 +1,6 @@
 // Ideal pictures of fields with an analytic F, every pixel of them inside its interval, and how much of the
 // interval an adversary within the bounds takes. VDVR_TRUTH_FIELDS asks for more fields than the few of every
-// day (scripts/pixel-truth).
+// day (scripts/long pixel-truth).
 #define BOOST_TEST_MODULE pixel_truth
 #include <boost/test/unit_test.hpp>
 

@@ -1,6 +1,6 @@
 // Pictures of certified volumes of real scans, held to F by its definition along random rays: every colour in
 // its interval, every first crossing of a surface in its band (docs/pixel-bounds.md, "Tests"). The volume is
-// not touched. scripts/scan-pictures runs it on the demo's volume and the tooth's.
+// not touched. scripts/long scan-pictures runs it on the demo's volume and the tooth's.
 //   scan_pictures SCAN VOLUME.vdvr PICTURES [RAYS [FIRST]]
 
 #include <algorithm>

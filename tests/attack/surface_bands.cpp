@@ -1,6 +1,6 @@
 // Bands of surfaces of fields with an analytic F: F's first crossing held to them at every pixel, and how
 // deep they are beside what V's own picture errs (docs/surfaces.md). A row of a table; fails where a crossing
-// lies outside. scripts/surface-bands makes the table.
+// lies outside. scripts/long surface-bands makes the table.
 //   surface_bands FIELD CELLS LEVEL VALUE [SIDE]
 // FIELD: marschner-lobb or blobs; LEVEL: samples 2^LEVEL to a cell; SIDE: pixels of the picture's side (64).
 #include <fmt/format.h>

@@ -40,6 +40,19 @@ std::vector<std::vector<double>> random_frequencies(int count, int rate, unsigne
 
 double product(const std::vector<double>& kappa) { return 1 - centre_error(kappa); }
 
+// sum_j (2 - kappa_j cot(kappa_j / 2))^2 <= 4 centre_error: the cell's centre is a local maximum of the
+// error. That it is then the largest is observed, and proved only from kExactProduct on.
+bool centre_is_local_maximum(std::span<const double> kappa) {
+  double sum = 0;
+  for (const double k : kappa) {
+    const double half = std::abs(k) / 2;
+    // 2 - kappa cot(kappa / 2) is kappa^2 / 6 + ... at 0, where the quotient loses its digits.
+    const double a = half < 1e-3 ? 2 * half * half / 3 : 2 - 2 * half * std::cos(half) / std::sin(half);
+    sum += a * a;
+  }
+  return sum <= 4 * centre_error(kappa);
+}
+
 using support::device;
 
 }  // namespace

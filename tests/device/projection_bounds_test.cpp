@@ -6,10 +6,11 @@
 #include <numbers>
 #include <random>
 
+#include "host/certify/bounds/amplitude_bounds.hpp"
 #include "host/certify/bounds/six_taps.hpp"
-#include "host/field/fbp/reconstruct.hpp"
 #include "host/certify/gold/gold_batch.hpp"
 #include "host/certify/gold/gold_stream.hpp"
+#include "host/field/fbp/reconstruct.hpp"
 #include "tests/reference/cosine_series.hpp"
 #include "tests/reference/ramp_filter.hpp"
 #include "tests/support/device.hpp"

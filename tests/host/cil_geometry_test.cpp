@@ -17,7 +17,6 @@ Vec3 turned(const Vec3& a, const Vec3& about, double angle_rad) {
 }
 
 Vec3 unit(const Vec3& a) { return scaled(a, 1 / length(a)); }
-Vec3 minus(const Vec3& a, const Vec3& b) { return sum(a, scaled(b, -1)); }
 
 struct Cil {
   Vec3 source{0.1, -99, 0.2}, detector{0.3, 52, -0.1}, x{1, 0.02, -0.03}, y{0, 0, 0}, axis{0.05, 1, 0.25},

@@ -5,7 +5,7 @@
 #include <sstream>
 
 #include "host/files/io/npy_file.hpp"
-#include "host/files/io/xml_file.hpp"
+#include "host/scan/geometry/rtk_geometry.hpp"
 #include "tests/support/cone_files.hpp"
 
 using namespace vdvr;
@@ -113,34 +113,46 @@ BOOST_AUTO_TEST_CASE(truncated_files_of_geometry_are_refused_at_every_length) {
                     npy = npy_bytes(matrices_of(scan.read(scan.geometry())), "12, 3, 4");
   const auto root_end = xml.rfind('>');
   for (std::size_t n = 0; n <= root_end; ++n)
-    BOOST_REQUIRE_THROW(static_cast<void>(io::read_xml(scan.folder.file("cut", xml.substr(0, n)))),
+    BOOST_REQUIRE_THROW(static_cast<void>(io::rtk_geometry(scan.folder.file("cut", xml.substr(0, n)), {},
+                                                           {views, rows, columns})),
                         FileError);
   for (std::size_t n = 0; n < npy.size(); ++n)
     BOOST_REQUIRE_THROW(static_cast<void>(io::read_npy(scan.folder.file("cut", npy.substr(0, n)))),
                         FileError);
 }
 
-BOOST_AUTO_TEST_CASE(xml_beyond_the_dialect_is_refused_with_its_line) {
+BOOST_AUTO_TEST_CASE(xml_that_geometry_has_no_use_for_is_refused_with_its_line) {
   const TemporaryFolder folder;
-  const auto with = [&](const std::string& text) {
+  const auto with_text = [&](const std::string& text) {
     try {
-      static_cast<void>(io::read_xml(folder.file("g.xml", text)));
+      static_cast<void>(io::rtk_geometry(folder.file("g.xml", text), {}, {1, rows, columns}));
     } catch (const FileError& e) {
       return std::string(e.what());
     }
     return std::string("accepted");
   };
-  BOOST_TEST(with("<a x='1 &lt; 2'>\n<b/><!-- c -->&amp;t</a>\n") == "accepted");
-  BOOST_TEST(has(with("<!DOCTYPE a [<!ENTITY x \"y\">]>\n<a/>"), "DOCTYPE"));
-  BOOST_TEST(has(with("<!DOCTYPE a SYSTEM \"b.dtd\"><a/>"), "DOCTYPE"));
-  BOOST_TEST(has(with("<a>\n&x;</a>"), "line 2: an entity"));
-  BOOST_TEST(has(with("<a>&#65;</a>"), "an entity"));
-  BOOST_TEST(has(with("<a><![CDATA[x]]></a>"), "CDATA"));
-  BOOST_TEST(has(with("<a/><b/>"), "follows the root"));
-  BOOST_TEST(has(with("<a x='1' x='2'/>"), "given twice"));
-  std::string deep;
-  for (int i = 0; i < 20; ++i) deep += "<a>";
-  BOOST_TEST(has(with(deep), "deeper than"));
+  const auto with = [&](const std::string& angle, const std::string& before = "",
+                        const std::string& after = "") {
+    return with_text(before +
+                     "<RTKThreeDCircularGeometry version='3'><SourceToIsocenterDistance>1e2<!-- c -->"
+                     "</SourceToIsocenterDistance><SourceToDetectorDistance> 150 </SourceToDetectorDistance>"
+                     "\n<Projection><GantryAngle>" +
+                     angle + "</GantryAngle></Projection>\n</RTKThreeDCircularGeometry>\n" + after);
+  };
+  BOOST_TEST(with("1", "<?xml version='1.0'?><!DOCTYPE RTKGEOMETRY>", "<!-- end -->") == "accepted");
+  // What a document type says of entities is not looked at, and nothing else is opened.
+  BOOST_TEST(
+      has(with("&x;", "<!DOCTYPE a [<!ENTITY x \"1\">]>"), "line 2: GantryAngle is '&x;', not a number"));
+  BOOST_TEST(has(with("&x;", "<!DOCTYPE a SYSTEM \"b.dtd\">"), "not a number"));
+  for (const char* text : {"1<!-- c -->2", "1<b/>", "<![CDATA[1]]>", "1 2", ""})
+    BOOST_TEST(has(with(text), "line 2: GantryAngle is"), text);
+  BOOST_TEST(has(with("1", "", "<b/>"), "line 4: something follows the root"));
+  BOOST_TEST(has(with_text("<a>\n</b>"), "line 2: "));
+  std::string deep, flat = "<a>";
+  for (int i = 0; i < 1'000'000; ++i) deep += "<a>";
+  for (int i = 0; i < 1'100'000; ++i) flat += "<b/>";
+  BOOST_TEST(has(with_text(deep), "truncated"));
+  BOOST_TEST(has(with_text(flat + "</a>"), "more than 1048576 tags"));
 }
 
 BOOST_AUTO_TEST_CASE(npy_files_of_other_kinds_are_refused) {

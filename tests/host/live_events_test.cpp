@@ -349,10 +349,8 @@ BOOST_AUTO_TEST_CASE(requests_that_are_none_are_refused_in_one_line) {
   BOOST_TEST(refusal(events + "]}").find("256") != std::string::npos);
 }
 
-BOOST_AUTO_TEST_CASE(the_scene_and_the_transfer_function_are_json) {
+BOOST_AUTO_TEST_CASE(the_scene_is_json) {
   const auto json = nlohmann::json::parse(to_json(scene()));
   BOOST_TEST(json["range"][1] == 1.75);
   BOOST_TEST(json["has_bounds"] == true);
-  const auto transfer = nlohmann::json::parse(transfer_text(start().view.transfer));
-  BOOST_TEST(transfer["points"].size() == start().view.transfer.points.size());
 }

@@ -312,20 +312,20 @@ BOOST_AUTO_TEST_CASE(json_phantom_equals_the_same_list) {
 
 BOOST_AUTO_TEST_CASE(faulty_json_is_refused_with_path_and_member) {
   const std::string good = R"("density": 1, "center": [0, 0, 0], "semi_axes": [1, 1, 1])";
-  check_refused("{", "not valid JSON");
+  check_refused("{", "is not JSON");
   check_refused("[]", "not a JSON object");
-  check_refused("{}", "\"ellipsoids\" is missing");
+  check_refused("{}", "'ellipsoids' must be a list");
   check_refused(R"({"ellipsoids": []})", "at least one");
   check_refused(R"({"ellipsoids": [{"density": 1, "center": [0, 0, 0]}]})",
-                "ellipsoids[0]: member \"semi_axes\" is missing");
+                "'ellipsoids[0].semi_axes' must be a list of numbers");
   check_refused(R"({"ellipsoids": [{"density": "1", "center": [0, 0, 0], "semi_axes": [1, 1, 1]}]})",
-                "a number is expected");
+                "'ellipsoids[0].density' must be a number");
   check_refused(R"({"ellipsoids": [{"density": 1, "center": [0, 0], "semi_axes": [1, 1, 1]}]})",
                 "three numbers");
   check_refused(R"({"ellipsoids": [{"density": 1, "center": [0, 0, 0], "semi_axes": [1, 0, 1]}]})",
                 "semi-axis 0");
-  check_refused(R"({"ellipsoids": [{)" + good + R"(, "phi": 3}]})", "unknown member \"phi\"");
-  check_refused(R"({"ellipsoids": [{)" + good + R"(}], "background": 1e999})", "not valid JSON");
+  check_refused(R"({"ellipsoids": [{)" + good + R"(, "phi": 3}]})", "member 'ellipsoids[0].phi' is unknown");
+  check_refused(R"({"ellipsoids": [{)" + good + R"(}], "background": 1e999})", "is not JSON");
   BOOST_CHECK_THROW(read_phantom("no/such/file.json"), FileError);
   BOOST_CHECK_THROW(read_phantom(std::filesystem::temp_directory_path()), FileError);
 }

@@ -118,7 +118,7 @@ double check(const std::vector<Wave>& waves, const std::array<double, 3>& p, boo
     amplitudes += std::abs(w.amplitude) * std::pow(w.k[0], order[0]) * std::pow(w.k[1], order[1]);
     sup += std::abs(w.amplitude);
   }
-  BOOST_TEST(truth <= local + amplitude_tail(n, n, n) * amplitudes);
+  BOOST_TEST(truth <= local + (std::pow(1 + n.eta, 3) - 1) * amplitudes);
   BOOST_TEST(truth <= local + (mixed ? mixed_tail(n, n, n) : pure_tail(n, n, n)) * sup);
   return truth / local;
 }

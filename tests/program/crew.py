@@ -3,7 +3,7 @@
 
 usage: crew.py devices|shares|frames|mpi|kills VDVR [--mpi LAUNCHER VDVR-MPI]... [--workers N] [--leaders N]
 
-`kills` kills N ranks that work and N times the one that leads (1 and 1 by default; scripts/crew-kills is the
+`kills` kills N ranks that work and N times the one that leads (1 and 1 by default; scripts/long crew-kills is the
 long form), at moments that a seed chooses. Without a launcher `mpi` and `kills` are skipped by name.
 """
 import argparse

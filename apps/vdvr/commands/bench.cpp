@@ -9,17 +9,15 @@
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/certify.hpp"
-#include "apps/vdvr/commands/bench_tune.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
-#include "apps/vdvr/pictures.hpp"
 #include "apps/vdvr/source.hpp"
 #include "apps/vdvr/view.hpp"
-#include "apps/vdvr/volume_input.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/certified_region.hpp"
 #include "vdvr/expert/measure_tightness.hpp"
 #include "vdvr/expert/simulate.hpp"
+#include "vdvr/expert/tune.hpp"
 
 namespace vdvr::cli {
 namespace {
@@ -246,7 +244,7 @@ int bench_render(Arguments& args) {
   const CommonOptions common = common_options(args);
   const std::string method = method_option(args);
   const std::int64_t frames = args.integer_or("frames", 60, 1, 100000);
-  const std::string sampler = args.choice("sampler", {"auto", "image3d", "buffer"}, "auto");
+  const SamplerKind sampler = sampler_option(args);
   ProgressLine progress(args.who(), common.quiet);
   Source source(args, common, method, false, progress.callback());
   const Scene& scene = source.scene();
@@ -262,10 +260,7 @@ int bench_render(Arguments& args) {
   o.gradient = gradient_option(args);
   o.transfer = transfer_for(args, bright, scene.volume.grid);
   // A speed promises nothing: one asked for by name is timed whatever it may err by.
-  const SafeSampler safe = source.take_sampler(sampler == "auto"     ? SamplerKind::automatic
-                                               : sampler == "buffer" ? SamplerKind::buffer
-                                                                     : SamplerKind::image3d,
-                                               true);
+  const SafeSampler safe = source.take_sampler(sampler, true);
   o.sampler = safe.sampler;
 
   o.skip_empty = !args.has("no-skip");
@@ -353,6 +348,52 @@ int bench_bounds(Arguments& args) {
                         {"bound", t.projection_bound},
                         {"ratio", ratio(t.projection_bound, t.projection_error)}};
   line["arithmetic"] = t.arithmetic;
+  print_line(line);
+  return 0;
+}
+
+Json row_of(const TuneCandidate& c) {
+  return {{"lanes", c.lanes}, {"tile", c.tile},   {"vectors", c.vectors},
+          {"tiles", c.tiles}, {"local", c.local}, {"gups", c.gups}};
+}
+
+/// Launch parameters measured on this device, as a row for the table of host/base/opencl/column_tuning.cpp.
+int bench_tune(Arguments& args) {
+  args.value("size", "256", "samples per axis, and detector columns and rows (default 256)")
+      .value("angles", "180", "views (default 180)")
+      .value("repetitions", "N", "default 5");
+  add_common(args);
+  if (!args.parse()) return 0;
+  const CommonOptions common = common_options(args);
+  const std::int64_t size = args.integer_or("size", 256, 16, 2048);
+  const std::int64_t views = args.integer_or("angles", 180, 2, 1 << 14);
+  const int repetitions = static_cast<int>(args.integer_or("repetitions", 5, 1, 1000));
+  Device device = open_device(common);
+  ProgressLine progress(args.who(), common.quiet);
+  const TuneResult result = tune(device, size, views, repetitions, progress.callback());
+  progress.clear();
+  Json candidates = Json::array(), filters = Json::array(), recorded;
+  for (const TuneCandidate& c : result.candidates) {
+    candidates.push_back(row_of(c));
+    if (c.recorded) recorded = row_of(c);
+  }
+  for (const TuneFilter& f : result.filters)
+    filters.push_back({{"columns", f.columns},
+                       {"product_seconds", f.product_seconds},
+                       {"fourier_seconds", f.fourier_seconds}});
+  Json best = row_of(result.candidates.front());
+  best["device_class"] = device.info().is_gpu ? "gpu" : "cpu";
+  best["product_columns"] = result.product_columns;
+  const Json line = {{"case", "tune"},
+                     {"device", device.info().name},
+                     {"driver", device.info().driver},
+                     {"size", size},
+                     {"angles", views},
+                     {"repetitions", repetitions},
+                     {"row", best},
+                     {"recorded", recorded},
+                     {"candidates", candidates},
+                     {"filters", filters}};
   print_line(line);
   return 0;
 }

@@ -19,13 +19,9 @@ StackPlace stack_of(const Arguments& args, const ProjectionSet& scan) {
   const double detector = scan.report.source_to_detector,
                zoom = detector > 0 ? detector / first.source_to_axis : 1;
   double pitch_u = first.pitch_u * zoom, pitch_v = first.pitch_v * zoom;
-  if (args.has("pitch")) {
-    const bool both = args.text("pitch").find(',') != std::string::npos;
-    const auto pitch = *args.numbers("pitch", both ? 2 : 1);
-    pitch_u = pitch.front();
-    pitch_v = pitch.back();
-    if (!(pitch_u > 0 && pitch_v > 0))
-      throw InputError(fmt::format("--pitch: {} is not above 0", args.text("pitch")));
+  if (const auto pitch = args.one_or_two("pitch")) {
+    pitch_u = (*pitch)[0];
+    pitch_v = (*pitch)[1];
   }
   return centred_stack(g.columns, g.rows, pitch_u, pitch_v);
 }

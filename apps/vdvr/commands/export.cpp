@@ -30,7 +30,7 @@ void refuse_unused(const Arguments& args, ExportFormat format) {
 ExportOptions options_of(const Arguments& args, const CommonOptions& common, ExportFormat format) {
   ExportOptions o = volume_output_options(args, common, format);
   const char* fallback = format == ExportFormat::ome_zarr ? "4" : "1";
-  o.oversampling = std::stoi(args.choice("oversampling", {"1", "2", "4", "8"}, fallback));
+  o.oversampling = std::stoi(args.choice("oversampling", fallback));
   o.most_blocks =
       static_cast<std::size_t>(args.integer_or("blocks", std::stoi(default_blocks), 1, 10'000'000));
   return o;

@@ -8,7 +8,6 @@
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/noise_words.hpp"
 #include "apps/vdvr/output.hpp"
-#include "apps/vdvr/volume_input.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/vdvr_file.hpp"
 

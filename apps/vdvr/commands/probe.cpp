@@ -10,7 +10,6 @@
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
-#include "apps/vdvr/volume_input.hpp"
 #include "vdvr/expert/certified_points.hpp"
 #include "vdvr/expert/certify.hpp"
 #include "vdvr/expert/d2vr.hpp"
@@ -215,7 +214,7 @@ int probe_command(Arguments& args) {
   add_common(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
-  const bool d2vr = args.choice("method", {"vdvr", "d2vr"}, "vdvr") == "d2vr";
+  const bool d2vr = args.choice("method", "vdvr") == "d2vr";
   if (d2vr) refuse(args, {"exact", "like"}, "excludes --method d2vr, which is another field than F");
   else refuse(args, {"upsampling"}, "applies to --method d2vr");
   const auto path = args.path("FILE"), points_path = args.path("points"), output = args.path("output");

@@ -5,9 +5,8 @@
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/output.hpp"
-#include "apps/vdvr/pictures.hpp"
+#include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/serve/server.hpp"
-#include "apps/vdvr/volume_input.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/live_json.hpp"
 #include "vdvr/expert/live_renderer.hpp"

@@ -11,7 +11,6 @@
 #include "apps/vdvr/cone.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
-#include "apps/vdvr/volume_input.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/read_scan.hpp"
 
@@ -109,7 +108,7 @@ void apply_cone_options(const Arguments& args, SimulateOptions& scan) {
     cone.in_plane_deg = (*tilt)[0];
     cone.out_of_plane_deg = (*tilt)[1];
   }
-  cone.sense = args.choice("sense", {"1", "-1"}, "1") == "1" ? 1 : -1;
+  cone.sense = args.choice("sense", "1") == "1" ? 1 : -1;
   cone.focal_spot = args.number_or("focal-spot", 0);
   cone.supersampling = static_cast<int>(args.integer_or("supersampling", 1, 1, 16));
   // As seen at the axis the defaults are those of parallel beam.
@@ -127,13 +126,9 @@ void apply_scan_options(const Arguments& args, SimulateOptions& scan) {
     scan.columns = (*size)[0];
     scan.rows = (*size)[1];
   }
-  if (args.has("pitch")) {
-    const bool both = args.text("pitch").find(',') != std::string::npos;
-    const auto pitch = *args.numbers("pitch", both ? 2 : 1);
-    scan.pitch_u = pitch.front();
-    scan.pitch_v = pitch.back();
-    if (!(scan.pitch_u > 0 && scan.pitch_v > 0))
-      throw InputError(fmt::format("--pitch: {} is not above 0", args.text("pitch")));
+  if (const auto pitch = args.one_or_two("pitch")) {
+    scan.pitch_u = (*pitch)[0];
+    scan.pitch_v = (*pitch)[1];
   }
   if (args.has("point") && args.has("band-limited"))
     throw InputError("give one of --point and --band-limited");

@@ -1,6 +1,7 @@
 #include "apps/vdvr/serve/server.hpp"
 
 #include <fmt/format.h>
+#include <turbojpeg.h>
 
 #include <algorithm>
 #include <atomic>
@@ -10,7 +11,6 @@
 
 #include "apps/vdvr/serve/connection.hpp"
 #include "apps/vdvr/serve/drawing.hpp"
-#include "apps/vdvr/serve/encode.hpp"
 #include "apps/vdvr/serve/listener.hpp"
 #include "apps/vdvr/serve/page.hpp"
 #include "vdvr/error.hpp"
@@ -46,6 +46,31 @@ class Allowance {
   double left_ = kBurst;
   std::chrono::steady_clock::time_point at_ = std::chrono::steady_clock::now();
 };
+
+// Fine enough for a picture that the next one replaces at once.
+constexpr int kQuality = 85;
+
+struct End {
+  void operator()(void* handle) const { tjDestroy(handle); }
+};
+struct Free {
+  void operator()(unsigned char* bytes) const { tjFree(bytes); }
+};
+
+/// While it moves; at rest it is a PNG. Throws ResourceError.
+std::string jpeg_bytes(const Image& image) {
+  const std::unique_ptr<void, End> jpeg(tjInitCompress());
+  unsigned char* bytes = nullptr;
+  unsigned long size = 0;
+  const bool good = jpeg && tjCompress2(jpeg.get(), image.rgb.data(), static_cast<int>(image.width), 0,
+                                        static_cast<int>(image.height), TJPF_RGB, &bytes, &size, TJSAMP_420,
+                                        kQuality, TJFLAG_FASTDCT) == 0;
+  const std::unique_ptr<unsigned char, Free> owned(bytes);
+  if (!good)
+    throw ResourceError(fmt::format("a frame of {} x {} pixels cannot be encoded as JPEG: {}", image.width,
+                                    image.height, tjGetErrorStr2(jpeg.get())));
+  return {reinterpret_cast<const char*>(bytes), size};
+}
 
 const char* media_type(Resource asked) {
   switch (asked) {

@@ -17,6 +17,7 @@
 #include "host/base/opencl/state.hpp"
 #include "host/base/opencl/trust.hpp"
 #include "host/base/system/limits.hpp"
+#include "host/base/system/lower.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -300,12 +301,6 @@ void ask_image_formats(FoundDevice& found) {
   } catch (const cl::Error& e) {
     found.trouble = trouble_of(e);
   }
-}
-
-std::string lower(std::string s) {
-  std::transform(s.begin(), s.end(), s.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return s;
 }
 
 bool matches(const DeviceInfo& d, const std::string& selector) {

@@ -3,14 +3,12 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <atomic>
 #include <cstdlib>
 #include <fstream>
 #include <sstream>
 #include <string_view>
 #include <system_error>
-#include <vector>
 
 namespace vdvr {
 namespace {
@@ -64,34 +62,6 @@ void write_cached(const std::string& name, const std::string& bytes) noexcept {
     if (file) fs::rename(part, path, error);
     if (!file || error) fs::remove(part, error);
   } catch (...) {  // no memory for a name: nothing is remembered
-  }
-}
-
-void shrink_cache(const std::string& folder, std::uint64_t bytes) noexcept {
-  try {
-    const fs::path where = cache_folder();
-    if (where.empty()) return;
-    struct Entry {
-      fs::file_time_type used;
-      std::uint64_t bytes;
-      fs::path path;
-    };
-    std::vector<Entry> entries;
-    std::uint64_t all = 0;
-    std::error_code error;
-    for (const auto& entry : fs::directory_iterator(where / folder, error)) {
-      std::error_code gone;  // others may remove it meanwhile
-      const Entry e{entry.last_write_time(gone), entry.file_size(gone), entry.path()};
-      if (gone) continue;
-      all += e.bytes;
-      entries.push_back(e);
-    }
-    std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.used < b.used; });
-    for (const Entry& e : entries) {
-      if (all <= bytes) return;
-      if (fs::remove(e.path, error)) all -= e.bytes;
-    }
-  } catch (...) {  // it stays as large as it is
   }
 }
 

@@ -2,7 +2,6 @@
 // is as if there were no cache: whoever reads one checks what it holds.
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -16,8 +15,5 @@ std::filesystem::path cache_folder();
 std::optional<std::string> read_cached(const std::string& name);
 /// Whole or not at all, whoever else writes it.
 void write_cached(const std::string& name, const std::string& bytes) noexcept;
-
-/// Removes the files of a folder of the cache that were longest unread, until they take at most `bytes`.
-void shrink_cache(const std::string& folder, std::uint64_t bytes) noexcept;
 
 }  // namespace vdvr

@@ -22,10 +22,11 @@ std::filesystem::path folder_of(const std::filesystem::path& target) {
   return target.has_parent_path() ? target.parent_path() : std::filesystem::path(".");
 }
 
-void sync_path(const std::filesystem::path& path, int flags) {
+/// `flush`: fsync, or syncfs of all that was written to the path's disk.
+void sync_path(const std::filesystem::path& path, int flags, int (*flush)(int) = ::fsync) {
   const int fd = ::open(path.c_str(), flags);
   if (fd < 0) return;  // a file system that cannot be synced still renames atomically
-  const int failed = ::fsync(fd);
+  const int failed = flush(fd);
   const int why = errno;
   ::close(fd);
   if (failed != 0 && (why == ENOSPC || why == EDQUOT || why == EIO))
@@ -51,23 +52,28 @@ class Placing {
   std::lock_guard<std::mutex> guard_;
 };
 
+/// A name in the folder of `target` under which `make` has made something.
+template <class Make>
+std::string made_beside(const std::filesystem::path& target, const Make& make) {
+  const auto folder = folder_of(target);
+  std::error_code ignored;
+  if (!std::filesystem::is_directory(folder, ignored))
+    throw FileError(fmt::format("{}: folder '{}' does not exist", target.string(), folder.string()));
+  std::string name = (folder / ("." + target.filename().string() + ".XXXXXX")).string();
+  if (make(name.data())) return name;
+  const int why = errno;
+  if (why == ENOSPC) throw ResourceError(fmt::format("{}: disk full", target.string()));
+  throw FileError(
+      fmt::format("{}: cannot write into '{}': {}", target.string(), folder.string(), std::strerror(why)));
+}
+
 }  // namespace
 
 AtomicFile::AtomicFile(std::filesystem::path target) : target_(std::move(target)) {
-  const auto folder = folder_of(target_);
-  std::error_code ignored;
-  if (!std::filesystem::is_directory(folder, ignored))
-    throw FileError(fmt::format("{}: folder '{}' does not exist", target_.string(), folder.string()));
-  std::string name = (folder / ("." + target_.filename().string() + ".XXXXXX")).string();
-  const int fd = ::mkstemp(name.data());
-  if (fd < 0) {
-    const std::string why = std::strerror(errno);
-    if (errno == ENOSPC) throw ResourceError(fmt::format("{}: disk full", target_.string()));
-    throw FileError(fmt::format("{}: cannot write into '{}': {}", target_.string(), folder.string(), why));
-  }
+  int fd = -1;
+  temporary_ = made_beside(target_, [&](char* name) { return (fd = ::mkstemp(name)) >= 0; });
   ::fchmod(fd, 0644);
   ::close(fd);
-  temporary_ = name;
   note_temporary(temporary_);
 }
 
@@ -114,17 +120,7 @@ namespace {
 
 /// A new folder beside `target`, noted as temporary.
 std::filesystem::path folder_beside(const std::filesystem::path& target) {
-  const auto folder = folder_of(target);
-  std::error_code ignored;
-  if (!std::filesystem::is_directory(folder, ignored))
-    throw FileError(fmt::format("{}: folder '{}' does not exist", target.string(), folder.string()));
-  std::string name = (folder / ("." + target.filename().string() + ".XXXXXX")).string();
-  if (::mkdtemp(name.data()) == nullptr) {
-    const int why = errno;
-    if (why == ENOSPC) throw ResourceError(fmt::format("{}: disk full", target.string()));
-    throw FileError(
-        fmt::format("{}: cannot write into '{}': {}", target.string(), folder.string(), std::strerror(why)));
-  }
+  std::string name = made_beside(target, [](char* folder) { return ::mkdtemp(folder) != nullptr; });
   ::chmod(name.c_str(), 0755);
   Temporaries& all = temporaries();
   const std::lock_guard guard(all.lock);
@@ -157,17 +153,6 @@ struct EmptyFolder {
   std::filesystem::path path;
 };
 
-/// All that was written to the disk of `path`: one call for thousands of small files.
-void sync_disk_of(const std::filesystem::path& path) {
-  const int fd = ::open(path.c_str(), O_RDONLY | O_DIRECTORY);
-  if (fd < 0) return;
-  const int failed = ::syncfs(fd);
-  const int why = errno;
-  ::close(fd);
-  if (failed != 0 && (why == ENOSPC || why == EDQUOT || why == EIO))
-    throw ResourceError(fmt::format("{}: cannot be written: {}", path.string(), std::strerror(why)));
-}
-
 }  // namespace
 
 AtomicFolder::AtomicFolder(std::filesystem::path target) : target_(std::move(target)) {
@@ -180,7 +165,7 @@ AtomicFolder::~AtomicFolder() {
 }
 
 void AtomicFolder::commit() {
-  sync_disk_of(temporary_);
+  sync_path(temporary_, O_RDONLY | O_DIRECTORY, ::syncfs);  // one call for thousands of small files
   std::error_code ignored;
   const bool replaces = std::filesystem::exists(target_, ignored);
   const EmptyFolder aside(replaces ? folder_beside(target_) : std::filesystem::path());

@@ -120,17 +120,6 @@ double wave_error_bound(std::span<const double> kappa) {
   return x[0] == 0 ? two : std::min(two + x[0], table_bound(1 - e, 3));
 }
 
-bool centre_is_local_maximum(std::span<const double> kappa) {
-  double sum = 0;
-  for (const double k : kappa) {
-    const double half = std::abs(k) / 2;
-    // 2 - kappa cot(kappa / 2) is kappa^2 / 6 + ... at 0, where the quotient loses its digits.
-    const double a = half < 1e-3 ? 2 * half * half / 3 : 2 - 2 * half * std::cos(half) / std::sin(half);
-    sum += a * a;
-  }
-  return sum <= 4 * centre_error(kappa);
-}
-
 ErrorMap error_map(Device& device, const std::array<FrequencyAxis, 3>& axes, int rate) {
   if (rate < 1) throw InputError(fmt::format("error map: rate {}; the least is 1", rate));
   ErrorMap map;

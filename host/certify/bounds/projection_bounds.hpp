@@ -1,5 +1,5 @@
-// Global bounds that rest on the filtered projections: sups, the errors of the chain to gold, amplitude
-// bounds (docs/error-bounds.md).
+// Global bounds that rest on the filtered projections: sups, the errors of the chain to gold
+// (docs/error-bounds.md).
 #pragma once
 
 #include <string>
@@ -36,6 +36,8 @@ FieldSups value_sups(opencl::State& state, Upsampler& upsampler, const FilteredS
 /// Of cone beam: values and second derivatives, view by view. Cost: as field_sups.
 FieldSups cone_sups(opencl::State& state, Upsampler& upsampler, const FilteredScan& scan,
                     std::int64_t step = 1);
+/// What sums over every step-th view have to be multiplied by.
+double share_of_views(std::int64_t views, std::int64_t step);
 /// Multiply-adds of field_sups.
 double cost_of_sups(const ParallelGeometry& geometry);
 
@@ -87,14 +89,5 @@ ChainErrors chain_errors(Upsampler& upsampler, const FilteredScan& scan, const F
 double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const FieldSups& sups,
                         const UpsampledColumns& columns, const ColumnBlocks& blocks,
                         Interpolation interpolation, Fp64 fp64 = Fp64::as_here);
-
-/// Amplitude bounds: sum of |A| e over the spectrum of the mirror extension, e the proved worst error of a
-/// wave (error_map.hpp), for interpolation in u at each rate and for gold at each rate. Cost: views * rows *
-/// columns per rate, on the host, of every `step`-th view as for field_sups.
-struct AmplitudeBounds {
-  std::vector<std::pair<int, double>> projection, gold;
-};
-AmplitudeBounds amplitude_bounds(const FilteredScan& scan, const Grid& grid, const std::vector<int>& rates,
-                                 std::int64_t step = 1);
 
 }  // namespace vdvr

@@ -70,10 +70,6 @@ Functional over_positions(int order, double band, int taps, double eta, int inte
   return largest;
 }
 
-}  // namespace
-
-namespace {
-
 RemainderNorms compute(double band, int taps, double eta) {
   // As many positions as leave four fifths of eta to the taps: (band / 2 n)^2 / 8 <= eta / 5.
   const int intervals = static_cast<int>(std::ceil(band / 2 * std::sqrt(5 / (8 * eta))));
@@ -115,10 +111,6 @@ double pure_factor(const RemainderNorms& along, const RemainderNorms& across, co
 
 double mixed_factor(const RemainderNorms& first, const RemainderNorms& second, const RemainderNorms& across) {
   return first.second * second.second * across.value;
-}
-
-double amplitude_tail(const RemainderNorms& x, const RemainderNorms& y, const RemainderNorms& z) {
-  return (1 + x.eta) * (1 + y.eta) * (1 + z.eta) - 1;
 }
 
 // d (x) a (x) a is a derivative, at most band^4 sup |f| (Bernstein), and three errors: the product of what

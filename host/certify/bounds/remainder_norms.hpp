@@ -35,9 +35,6 @@ RemainderNorms remainder_norms(double band, int taps = 16, double eta = 1e-4);
 double pure_factor(const RemainderNorms& along, const RemainderNorms& across, const RemainderNorms& other);
 double mixed_factor(const RemainderNorms& first, const RemainderNorms& second, const RemainderNorms& across);
 
-/// The tails by amplitudes: this times sum |A| (h_j w_j)^4, or sum |A| (h_i w_i)^2 (h_j w_j)^2.
-double amplitude_tail(const RemainderNorms& x, const RemainderNorms& y, const RemainderNorms& z);
-
 /// The tails by sups: this times sup |F| of a field band-limited along each axis.
 double pure_tail(const RemainderNorms& along, const RemainderNorms& across, const RemainderNorms& other);
 double mixed_tail(const RemainderNorms& first, const RemainderNorms& second, const RemainderNorms& across);

@@ -6,46 +6,10 @@
 
 namespace vdvr {
 
-void put(ByteWriter& out, const BlockKey& key) {
-  for (const std::int64_t n : {key.rate, key.pass, key.z, key.size[0], key.size[1], key.size[2]}) out.put(n);
-  out.put(key.first);
-}
-
 BlockKey get_key(ByteReader& in) {
-  BlockKey key;
-  for (std::int64_t* n : {&key.rate, &key.pass, &key.z, key.size.data(), &key.size[1], &key.size[2]})
-    *n = in.get<std::int64_t>();
-  key.first = in.get_vector<std::array<std::int64_t, 2>>();
+  auto key = in.get<BlockKey>();
   if (key.first.empty()) throw FileError("a journal record is of no block; start again without `resume`");
   return key;
-}
-
-void put(ByteWriter& out, const BrickMeasure& m) {
-  out.put(m.brick);
-  out.put(m.total);
-  out.put(m.error);
-  out.put(m.slack);
-  out.put(m.violated);
-  out.put(m.rate);
-}
-
-BrickMeasure get_measure(ByteReader& in) {
-  BrickMeasure m;
-  m.brick = in.get<std::int64_t>();
-  m.total = in.get<float>();
-  m.error = in.get<float>();
-  m.slack = in.get<float>();
-  m.violated = in.get<std::uint32_t>();
-  m.rate = in.get<int>();
-  return m;
-}
-
-AxisErrors get_along(ByteReader& in) {
-  AxisErrors along;
-  for (auto& axis : along.of)
-    for (auto& level : axis)
-      for (float& error : level) error = in.get<float>();
-  return along;
 }
 
 bool is_taken(const BlockPass& pass, const BrickLevels& l) {
@@ -56,19 +20,11 @@ namespace {
 
 using Tiles = std::vector<std::pair<std::int64_t, LevelTriple>>;
 
-void put(ByteWriter& out, const AxisErrors& along) {
-  for (const auto& axis : along.of)
-    for (const auto& level : axis)
-      for (const float error : level) out.put(error);
-}
-
 void put_levels(ByteWriter& out, const std::vector<BrickLevels>& levels) {
   out.put(static_cast<std::uint64_t>(levels.size()));
   for (const BrickLevels& l : levels) {
-    vdvr::put(out, l.base);
-    out.put(l.level);
-    out.put(static_cast<std::uint8_t>(l.passes));
-    if (is_above_base(l.level)) put(out, l.along);
+    out(l.base, l.level, l.passes);
+    if (is_above_base(l.level)) out.put(l.along);
   }
 }
 
@@ -79,9 +35,7 @@ void put_tiles(ByteWriter& out, const Tiles& tiles, const std::vector<float>& sa
     bricks.push_back(brick);
     levels.push_back(level);
   }
-  out.put(bricks);
-  out.put(levels);
-  out.put(samples);
+  out(bricks, levels, samples);
 }
 
 // Runs of samples that lie one after another.
@@ -96,9 +50,7 @@ void put_fit(ByteWriter& out, GoldBatch& batch) {
     ++length.back();
     samples.push_back(sample);
   });
-  out.put(first);
-  out.put(length);
-  out.put(samples);
+  out(first, length, samples);
 }
 
 void put_classes(ByteWriter& out, GoldBatch& batch, const BlockPass& pass, const DeviceField& field,
@@ -120,7 +72,7 @@ void put_extract(ByteWriter& out, GoldBatch& batch, const BlockPass& pass) {
   Tiles tiles;
   for (const std::int64_t id : batch.bricks()) tiles.emplace_back(id, pass.level.at(at(id)));
   put_tiles(out, tiles, batch.extract(tiles));
-  for (const AxisErrors& along : batch.axis_errors(batch.bricks())) put(out, along);
+  for (const AxisErrors& along : batch.axis_errors(batch.bricks())) out.put(along);
 }
 
 }  // namespace
@@ -129,17 +81,16 @@ void read_levels(ByteReader& in, const std::function<void(const BrickLevels&)>& 
   const auto n = in.get<std::uint64_t>();
   for (std::uint64_t i = 0; i < n; ++i) {
     BrickLevels l;
-    l.base = get_measure(in);
-    l.level = in.get<LevelTriple>();
-    l.passes = in.get<std::uint8_t>() != 0;
-    if (is_above_base(l.level)) l.along = get_along(in);
+    in(l.base, l.level, l.passes);
+    if (is_above_base(l.level)) l.along = in.get<AxisErrors>();
     visit(l);
   }
 }
 
 void read_fit(ByteReader& in, const std::function<void(std::size_t, float)>& visit) {
-  const auto first = in.get_vector<std::uint64_t>(), length = in.get_vector<std::uint64_t>();
-  const auto samples = in.get_vector<float>();
+  std::vector<std::uint64_t> first, length;
+  std::vector<float> samples;
+  in(first, length, samples);
   std::size_t next = 0;
   for (std::size_t run = 0; run < first.size(); ++run)
     for (std::uint64_t i = 0; i < length.at(run); ++i) visit(first[run] + i, samples.at(next++));
@@ -159,14 +110,13 @@ Bytes remainder_record(const BrickRemainder& remainder, const BrickRemainder::Bl
                        const BlockPass& pass, int rate) {
   ByteWriter out;
   const auto& [first, size] = block;
-  put(out, BlockKey{rate, pass.number, first[2], size, {{first[0], first[1]}}});
-  out.put(remainder.found(block));
+  out(BlockKey{rate, pass.number, first[2], size, {{first[0], first[1]}}}, remainder.found(block));
   return out.take();
 }
 
 void take_remainder(ByteReader& in, const BlockKey& key, BrickRemainder& remainder) {
   const auto& [x, y] = key.first.at(0);
-  remainder.take({{x, y, key.z}, key.size}, in.get_vector<float>());
+  remainder.take({{x, y, key.z}, key.size}, in.get<std::vector<float>>());
 }
 
 Bytes compute_record(GoldBatch& batch, const BlockPass& pass, const DeviceField* field,
@@ -174,7 +124,7 @@ Bytes compute_record(GoldBatch& batch, const BlockPass& pass, const DeviceField*
   ByteWriter out;
   BlockKey key{rate, pass.number, batch.first_brick().front()[2], batch.block_bricks(), {}};
   for (const auto& first : batch.first_brick()) key.first.push_back({first[0], first[1]});
-  put(out, key);
+  out.put(key);
   switch (pass.ask) {
     case BlockPass::Ask::fit:
       put_fit(out, batch);
@@ -191,7 +141,7 @@ Bytes compute_record(GoldBatch& batch, const BlockPass& pass, const DeviceField*
       put_classes(out, batch, pass, *field, selected);
       break;
     case BlockPass::Ask::measure:
-      for (const BrickMeasure& m : batch.measure(*field, pass.tolerance, selected, true)) put(out, m);
+      for (const BrickMeasure& m : batch.measure(*field, pass.tolerance, selected, true)) out.put(m);
       break;
     case BlockPass::Ask::extract:
       put_extract(out, batch, pass);

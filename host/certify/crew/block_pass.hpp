@@ -46,7 +46,7 @@ struct BlockKey {
     return {rate, pass, z, size[2], size[0], size[1], first[block][1], first[block][0]};
   }
 };
-void put(ByteWriter& out, const BlockKey& key);
+void members(auto& way, Of<BlockKey> auto& k) { way(k.rate, k.pass, k.z, k.size, k.first); }
 BlockKey get_key(ByteReader& in);
 
 /// What one brick was found to be.
@@ -57,9 +57,10 @@ struct BrickLevels {
   AxisErrors along{};
 };
 
-void put(ByteWriter& out, const BrickMeasure& measure);
-BrickMeasure get_measure(ByteReader& in);
-AxisErrors get_along(ByteReader& in);
+void members(auto& way, Of<BrickMeasure> auto& m) {
+  way(m.brick, m.total, m.error, m.slack, m.violated, m.rate);
+}
+void members(auto& way, Of<AxisErrors> auto& along) { way(along.of); }
 /// Of `test` and `classify`; tiles follow.
 void read_levels(ByteReader& in, const std::function<void(const BrickLevels&)>& visit);
 /// Of `fit`: index into the base and sample.

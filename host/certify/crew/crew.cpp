@@ -142,16 +142,16 @@ std::optional<std::pair<CrewReport, Bytes>> Crew::State::take_message(std::chron
   from->heard = Clock::now();
   ByteReader in(message->second);
   CrewReport report{static_cast<std::size_t>(from - members.begin()), CrewReport::Kind::alive, 0, 0, {}, {}};
-  const auto word = static_cast<CrewWord>(in.get<std::uint8_t>());
+  const auto word = in.get<CrewWord>();
   Bytes rest;
   if (word == CrewWord::record || word == CrewWord::done) {
     report.kind = word == CrewWord::done ? CrewReport::Kind::done : CrewReport::Kind::record;
     report.pass = in.get<std::uint64_t>();
     report.piece = in.get<std::uint64_t>();
-    if (word == CrewWord::record) report.record = in.get_vector<std::byte>();
+    if (word == CrewWord::record) report.record = in.get<Bytes>();
   } else if (word == CrewWord::failed) {
     report.kind = CrewReport::Kind::failed;
-    lose(*from, "failed: " + get_text(in));
+    lose(*from, "failed: " + in.get<std::string>());
   } else if (word == CrewWord::hello || word == CrewWord::ready) {
     rest.assign(message->second.begin() + 1, message->second.end());
   }
@@ -192,14 +192,8 @@ Crew::Crew(Device& leader, PreparedScan& from, const GoldSettings& settings, con
     const std::uint64_t common = all && messenger.others() > 0 ? share_gold(from, settings, shared) : 0;
     for (State::Member& m : s.members) {
       if (!m.worker->is_remote()) continue;
-      ByteWriter out;
-      put(out, CrewWord::scan);
-      out.put(shared);
-      out.put(static_cast<std::uint64_t>(samples.size()));
-      out.put(static_cast<std::uint8_t>(options.mixed_devices));
-      out.put(common);
-      put_scan(out, from.filtered, from.sups, settings);
-      s.remote(m).send(out.take());
+      s.remote(m).send(message_of(CrewWord::scan, shared, std::uint64_t{samples.size()},
+                                  options.mixed_devices, common, from.filtered, from.sups, settings));
     }
     wait_for_kinds();
   } else if (all) {
@@ -269,7 +263,7 @@ void Crew::wait_for_kinds() {
     const auto message = s.take_message(std::chrono::milliseconds(50));
     if (!message || message->second.empty()) continue;
     ByteReader in(message->second);
-    const Kind kind = get_kind(in);
+    const auto kind = in.get<Kind>();
     if (s.options.mixed_devices && kind.arithmetic == 0) continue;  // hello; more is known when it is ready
     known[message->first.worker] = 1;
     if (std::none_of(kinds_.begin(), kinds_.end(), [&](const Kind& k) { return is_same(k.info, kind.info); }))

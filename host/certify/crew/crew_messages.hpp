@@ -34,28 +34,59 @@ enum class CrewWord : std::uint8_t {
 /// Samples of a field on their way, so many bytes at a time.
 constexpr std::uint64_t part_bytes = std::uint64_t{8} << 20;
 
-void put(ByteWriter& out, const std::string& text);
-std::string get_text(ByteReader& in);
-void put(ByteWriter& out, CrewWord word);
-
+template <class... T>
+Bytes message_of(CrewWord word, const T&... values) {
+  ByteWriter out;
+  out(word, values...);
+  return out.take();
+}
 /// `wake` or `open`.
-Bytes message_to_open(CrewWord word, const CrewOptions& options);
+inline Bytes message_to_open(CrewWord word, const CrewOptions& options) {
+  return message_of(word, options.device_of_others, options.memory_of_others, options.scratch_of_others);
+}
 
-void put_scan(ByteWriter& out, const FilteredScan& scan, const FieldSups& sups, const GoldSettings& settings);
+// --- what is said, member by member (bytes.hpp) ---
+
+void members(auto& way, Of<Grid> auto& g) { way(g.cells, g.origin, g.spacing, g.unit); }
+void members(auto& way, Of<ParallelGeometry> auto& g) {
+  way(g.columns, g.rows, g.pitch_u, g.pitch_v, g.center, g.unit, g.theta_rad);
+}
+void members(auto& way, Of<IntegerLattice> auto& l) {
+  way(l.step, l.base, l.least, l.base_shift, l.finest_shift);
+}
+/// The lattice comes with each pass.
+void members(auto& way, Of<GoldSettings> auto& s) {
+  way(s.grid, s.granularity, s.rate, s.upsampling, s.interpolation, s.window, s.midrange, s.anisotropic,
+      s.base_only, s.grid_only, s.curvature, s.coarse_rate, s.finer_rate, s.coarsening, s.heights_bytes,
+      s.least_reach);
+}
 /// Without the samples.
-void get_scan(ByteReader& in, FilteredScan& scan, FieldSups& sups, GoldSettings& settings);
-
-void put_kind(ByteWriter& out, const Crew::Kind& kind);
-Crew::Kind get_kind(ByteReader& in);
-
-void put_pass(ByteWriter& out, const BlockPass& pass);
-BlockPass get_pass(ByteReader& in);
-
-void put_records(ByteWriter& out, const std::vector<Bytes>& records);
-std::vector<Bytes> get_records(ByteReader& in);
-
-void put_works(ByteWriter& out, const Works& works);
-Works get_works(ByteReader& in);
+void members(auto& way, Of<FilteredScan> auto& s) {
+  way(s.geometry, s.views, s.fft_length, s.view_max, s.ramp_error);
+}
+void members(auto& way, Of<DetectorSups> auto& s) {
+  way(s.value, s.second_u, s.second_v, s.fourth_u, s.second_uv, s.fourth_v);
+}
+void members(auto& way, Of<FieldSups> auto& s) {
+  way(s.value, s.second_u, s.second_v, s.sampled_second_u, s.sampled_second_v, s.by_view);
+}
+/// By what devices are told apart, and what is charged for their texture units.
+void members(auto& way, Of<DeviceInfo> auto& d) {
+  way(d.platform, d.name, d.vendor, d.version, d.driver, d.is_gpu, d.is_cpu, d.subnormals, d.images,
+      d.linear_float_image, d.linear_u16_image, d.linear_u8_image, d.image3d_max);
+}
+void members(auto& way, Of<FilterProbe> auto& p) {
+  way(p.image3d, p.weight_error, p.delta, p.constant_error, p.by_steps);
+}
+void members(auto& way, Of<SamplerProbe> auto& p) {
+  way(p.image3d, p.weight_error, p.delta, p.constant_error, p.by_steps, p.u16, p.u8);
+}
+void members(auto& way, Of<Crew::Kind> auto& k) { way(k.info, k.probe, k.arithmetic); }
+void members(auto& way, Of<BlockPass> auto& p) {
+  way(p.ask, p.fine, p.purpose, p.number, p.tolerance.of_all, p.tolerance.by_brick, p.lattice, p.selected,
+      p.level);
+}
+void members(auto& way, Of<GoldStream::Work> auto& w) { way(w.z, w.height, w.width_x, w.width_y, w.first); }
 
 /// A volume without its samples, and where these lie.
 void put_shape(ByteWriter& out, const MixedVolume& volume);

@@ -121,47 +121,26 @@ void RemoteWorker::send(Bytes message) {
 
 void RemoteWorker::use(const MixedVolume& volume, const MemoryBudget&) {
   ByteWriter shape;
-  put(shape, CrewWord::field);
+  shape.put(CrewWord::field);
   put_shape(shape, volume);
   send(shape.take());
   for (const auto& samples : samples_of(volume))
     for (std::uint64_t from = 0; from < samples.size(); from += part_bytes) {
       const auto part = samples.subspan(from, std::min<std::uint64_t>(part_bytes, samples.size() - from));
-      ByteWriter out;
-      put(out, CrewWord::part);
-      out.put(std::vector<std::byte>(part.begin(), part.end()));
-      send(out.take());
+      send(message_of(CrewWord::part, Bytes(part.begin(), part.end())));
     }
 }
 
-void RemoteWorker::learn(const Records& records) {
-  ByteWriter out;
-  put(out, CrewWord::learn);
-  put_records(out, *records);
-  send(out.take());
-}
+void RemoteWorker::learn(const Records& records) { send(message_of(CrewWord::learn, *records)); }
 
 void RemoteWorker::begin(std::uint64_t number, SharedPass pass) {
-  ByteWriter out;
-  put(out, CrewWord::pass);
-  out.put(number);
-  put_pass(out, *pass);
-  send(out.take());
+  send(message_of(CrewWord::pass, number, *pass));
 }
 
 void RemoteWorker::give(std::uint64_t number, std::size_t piece, const Works& works) {
-  ByteWriter out;
-  put(out, CrewWord::work);
-  out.put(number);
-  out.put(static_cast<std::uint64_t>(piece));
-  put_works(out, works);
-  send(out.take());
+  send(message_of(CrewWord::work, number, std::uint64_t{piece}, works));
 }
 
-void RemoteWorker::halt() {
-  ByteWriter out;
-  put(out, CrewWord::halt);
-  send(out.take());
-}
+void RemoteWorker::halt() { send(message_of(CrewWord::halt)); }
 
 }  // namespace vdvr

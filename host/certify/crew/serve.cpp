@@ -40,7 +40,7 @@ class Server {
     for (;;) {
       Bytes message = next();
       ByteReader in(message);
-      const auto word = static_cast<CrewWord>(in.get<std::uint8_t>());
+      const auto word = in.get<CrewWord>();
       if (word == CrewWord::dismiss) break;
       if (failed_ && word != CrewWord::open) continue;
       try {
@@ -49,10 +49,7 @@ class Server {
         throw;
       } catch (const std::exception& e) {
         failed_ = std::current_exception();
-        ByteWriter out;
-        put(out, CrewWord::failed);
-        put(out, std::string(e.what()));
-        messenger_.send(leader, out.take());
+        messenger_.send(leader, message_of(CrewWord::failed, std::string(e.what())));
       }
     }
     if (failed_) std::rethrow_exception(failed_);
@@ -104,10 +101,10 @@ class Server {
       case CrewWord::part:
         return take_part(in);
       case CrewWord::learn:
-        return member_->learn(get_records(in));
+        return member_->learn(in.get<std::vector<Bytes>>());
       case CrewWord::pass:
         pass_ = in.get<std::uint64_t>();
-        if (!is_halted()) member_->begin(std::make_shared<const BlockPass>(get_pass(in)), progress());
+        if (!is_halted()) member_->begin(std::make_shared<const BlockPass>(in.get<BlockPass>()), progress());
         return;
       case CrewWord::work:
         if (!is_halted()) compute(in);
@@ -127,12 +124,9 @@ class Server {
   }
   void warm(ByteReader& in) {
     if (!device_) return;
-    const std::string name = get_text(in);
-    opencl::Defines defines(in.get<std::uint64_t>());
-    for (auto& [key, value] : defines) {
-      key = get_text(in);
-      value = get_text(in);
-    }
+    std::string name;
+    opencl::Defines defines;
+    in(name, defines);
     try {
       opencl::program(device_->state(), name, defines);
     } catch (const BuildError&) {
@@ -147,9 +141,9 @@ class Server {
   }
 
   void open_device(ByteReader& in) {
-    const std::string device = device_of(get_text(in), messenger_.place());
+    const std::string device = device_of(in.get<std::string>(), messenger_.place());
     auto memory = in.get<std::uint64_t>();
-    scratch_folder_ = get_text(in);
+    in(scratch_folder_);
     if (memory == 0) memory = half_of_free_memory();
     memory /= static_cast<std::uint64_t>(messenger_.neighbours());
     if (!device_ || device != opened_) {
@@ -161,21 +155,19 @@ class Server {
   }
 
   void say(CrewWord word, double arithmetic) {
-    ByteWriter out;
-    put(out, word);
-    put_kind(out, {device_->info(), probe_filters(*device_), arithmetic});
-    messenger_.send(leader, out.take());
+    messenger_.send(leader,
+                    message_of(word, Crew::Kind{device_->info(), probe_filters(*device_), arithmetic}));
   }
 
   void take_scan(ByteReader& in) {
     member_.reset();
     const auto shared = in.get<std::uint64_t>(), samples = in.get<std::uint64_t>();
-    const bool mixed = in.get<std::uint8_t>() != 0;
+    const auto mixed = in.get<bool>();
     const auto common = in.get<std::uint64_t>();
     scan_ = {};
     sups_ = {};
     GoldSettings settings;
-    get_scan(in, scan_, sups_, settings);
+    in(scan_, sups_, settings);
     const auto [bytes, owner] = messenger_.shared(shared);
     if (bytes.size() != samples * sizeof(float))
       throw ResourceError("the projections, filtered, did not arrive");
@@ -202,7 +194,7 @@ class Server {
   }
 
   void take_part(ByteReader& in) {
-    const auto bytes = in.get_vector<std::byte>();
+    const auto bytes = in.get<Bytes>();
     if (part_ >= parts_.size() || bytes.size() > parts_[part_].size())
       throw ResourceError("samples of a field came out of turn");
     std::memcpy(parts_[part_].data(), bytes.data(), bytes.size());
@@ -217,25 +209,16 @@ class Server {
 
   void compute(ByteReader& in) {
     const auto number = in.get<std::uint64_t>(), piece = in.get<std::uint64_t>();
-    const Works works = get_works(in);
+    const auto works = in.get<Works>();
     if (number != pass_) return;
-    const auto about = [&](CrewWord word) {
-      ByteWriter out;
-      put(out, word);
-      out.put(number);
-      out.put(piece);
-      return out;
-    };
     member_->compute(
         works,
         [&](const Bytes& record) {
-          ByteWriter out = about(CrewWord::record);
-          out.put(record);
-          messenger_.send(leader, out.take());
+          messenger_.send(leader, message_of(CrewWord::record, number, piece, record));
           said_ = Clock::now();
         },
         progress());
-    messenger_.send(leader, about(CrewWord::done).take());
+    messenger_.send(leader, message_of(CrewWord::done, number, piece));
   }
 
   Progress progress() {
@@ -243,9 +226,7 @@ class Server {
       throw_if_stopped();
       if (Clock::now() - said_ < alive_every) return;
       said_ = Clock::now();
-      ByteWriter out;
-      put(out, CrewWord::alive);
-      messenger_.send(leader, out.take());
+      messenger_.send(leader, message_of(CrewWord::alive));
     };
   }
 
@@ -281,24 +262,13 @@ void wake(Device& leader, const CrewOptions& options) {
   const auto thread = std::this_thread::get_id();
   leader.state().on_program = [send, thread](const std::string& name, const opencl::Defines& defines) {
     if (std::this_thread::get_id() != thread) return;  // a messenger has one
-    ByteWriter out;
-    put(out, CrewWord::warm);
-    put(out, name);
-    out.put(static_cast<std::uint64_t>(defines.size()));
-    for (const auto& [key, value] : defines) {
-      put(out, key);
-      put(out, value);
-    }
-    send(out.take());
+    send(message_of(CrewWord::warm, name, defines));
   };
 }
 
 void dismiss(Messenger& messenger) {
-  for (int process = 1; process <= messenger.others(); ++process) {
-    ByteWriter out;
-    put(out, CrewWord::dismiss);
-    messenger.send(process, out.take());
-  }
+  for (int process = 1; process <= messenger.others(); ++process)
+    messenger.send(process, message_of(CrewWord::dismiss));
 }
 
 }  // namespace vdvr

@@ -40,6 +40,19 @@ Coverage::Coverage(const ParallelGeometry& g)
   index();
 }
 
+std::array<std::array<double, 4>, 4> planes_of_view(const ViewMatrix& m, std::int64_t columns,
+                                                    std::int64_t rows) {
+  const auto plane_of = [&](std::size_t row, double bound, double sign) {
+    std::array<double, 4> plane{};
+    for (std::size_t j = 0; j < 4; ++j) plane[j] = sign * (m[row][j] - bound * m[2][j]);
+    const double norm = std::hypot(plane[0], plane[1], plane[2]);
+    for (double& value : plane) value /= norm;
+    return plane;
+  };
+  return {plane_of(0, -0.5, 1), plane_of(0, static_cast<double>(columns) - 0.5, -1), plane_of(1, 0, 1),
+          plane_of(1, static_cast<double>(rows - 1), -1)};
+}
+
 Coverage::Coverage(const ParallelGeometry& g, const std::vector<ViewMatrix>& views) {
   if (views.empty()) {
     *this = Coverage(g);
@@ -47,22 +60,9 @@ Coverage::Coverage(const ParallelGeometry& g, const std::vector<ViewMatrix>& vie
   }
   slack_ = 1e-9 * g.pitch_u;
   slack_z_ = 1e-9 * g.pitch_v;
-  // Of each view, four planes through the source bound what it sees: unit normals inwards, and what the axis'
-  // point has.
   std::vector<std::array<double, 4>> planes;
-  for (const ViewMatrix& m : views) {
-    const auto add = [&](std::size_t row, double bound, double sign) {
-      std::array<double, 4> plane{};
-      for (std::size_t j = 0; j < 4; ++j) plane[j] = sign * (m[row][j] - bound * m[2][j]);
-      const double norm = std::hypot(plane[0], plane[1], plane[2]);
-      for (double& value : plane) value /= norm;
-      planes.push_back(plane);
-    };
-    add(0, -0.5, 1);
-    add(0, static_cast<double>(g.columns) - 0.5, -1);
-    add(1, 0, 1);
-    add(1, static_cast<double>(g.rows - 1), -1);
-  }
+  for (const ViewMatrix& m : views)
+    for (const auto& plane : planes_of_view(m, g.columns, g.rows)) planes.push_back(plane);
   take_cylinder(planes);
   index();
 }

@@ -53,6 +53,11 @@ class Coverage {
   double inner_ = 0, slack_ = 0, slack_z_ = 0;
 };
 
+/// What a view of cone beam sees is bounded by four planes through its source, by its columns' outer edges
+/// first: unit normals inwards, and what the axis' point has.
+std::array<std::array<double, 4>, 4> planes_of_view(const ViewMatrix& matrix, std::int64_t columns,
+                                                    std::int64_t rows);
+
 /// What the options say, else a box around a cylinder about the axis. Throws InputError for a grid that is
 /// empty, not finite, or too large.
 Grid grid_around(const ParallelGeometry& geometry, double radius, std::pair<double, double> heights,

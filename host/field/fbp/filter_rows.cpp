@@ -321,9 +321,7 @@ class ProductFilter : public RowFilter {
     }
     taps_ = opencl::DeviceArray<Real>(state, std::span<const Real>(taps), "ramp filter");
     double sum = kernel[0] * kernel[0];
-    for (std::size_t j = 1; j < columns_; ++j) {
-      sum += 2 * kernel[j] * kernel[j];
-    }
+    for (std::size_t j = 1; j < columns_; ++j) sum += 2 * kernel[j] * kernel[j];
     norm_ = std::sqrt(sum);
   }
 
@@ -467,10 +465,6 @@ class ProductFilter : public RowFilter {
   double norm_ = 0;
 };
 
-bool has_double(const opencl::State& state) {
-  return state.device.getInfo<CL_DEVICE_DOUBLE_FP_CONFIG>() != 0;
-}
-
 }  // namespace
 
 bool has_transform(const DeviceInfo& device, std::int64_t columns, Precision precision) {
@@ -485,7 +479,8 @@ InputError not_finite(std::int64_t view) {
 std::unique_ptr<RowFilter> make_row_filter(opencl::State& state, const ParallelGeometry& geometry,
                                            const std::vector<double>& kernel, FilterMethod method,
                                            Precision precision) {
-  if (precision == Precision::fp64 && !has_double(state)) method = FilterMethod::host;
+  const bool has_double = state.device.getInfo<CL_DEVICE_DOUBLE_FP_CONFIG>() != 0;
+  if (precision == Precision::fp64 && !has_double) method = FilterMethod::host;
   if (method == FilterMethod::automatic)
     method = geometry.columns <= column_tuning(state.info).product_columns ||
                      !has_transform(state.info, geometry.columns, precision)

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "host/field/fbp/coverage.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -16,18 +17,9 @@ ConeCoverage::ConeCoverage(const std::vector<ViewMatrix>& views, std::int64_t co
   double pitch = 0;
   for (std::size_t k = 0; k < views.size(); ++k) {
     const ViewMatrix& m = views[k];
-    const auto add = [&](std::size_t row, double bound, double sign) {
-      std::array<double, 4> plane{};
-      for (std::size_t j = 0; j < 4; ++j) plane[j] = sign * (m[row][j] - bound * m[2][j]);
-      const double norm = std::hypot(plane[0], plane[1], plane[2]);
-      for (double& value : plane) value /= norm;
-      planes_.push_back(plane);
-      if (row == 0) inner_ = std::min(inner_, plane[3]);
-    };
-    add(0, -0.5, 1);
-    add(0, static_cast<double>(columns) - 0.5, -1);
-    add(1, 0, 1);
-    add(1, static_cast<double>(rows - 1), -1);
+    const auto planes = planes_of_view(m, columns, rows);
+    planes_.insert(planes_.end(), planes.begin(), planes.end());
+    inner_ = std::min({inner_, planes[0][3], planes[1][3]});
     const ConeView view = cone_view(m);
     pitch = std::max({pitch, view.pitch_u, view.pitch_v});
   }

@@ -8,6 +8,7 @@
 #include <limits>
 #include <numbers>
 
+#include "host/base/system/casts.hpp"
 #include "host/field/fbp/view_weights.hpp"
 #include "host/scan/geometry/vectors.hpp"
 #include "vdvr/error.hpp"
@@ -18,8 +19,6 @@ namespace {
 constexpr double pi = std::numbers::pi;
 
 double degrees(double radians) { return radians * 180 / pi; }
-
-std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 }  // namespace
 

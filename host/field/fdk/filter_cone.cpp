@@ -30,10 +30,6 @@ ViewMatrix padded(const ViewMatrix& matrix, const FdkWeights& weights) {
   return recentred(matrix, matrix[0][3] / matrix[2][3] + static_cast<double>(weights.pad_before()));
 }
 
-}  // namespace
-
-namespace {
-
 // The matrices with the columns that a displaced detector is padded with, and how many these are.
 struct Padded {
   Padded(const ProjectionSet& scan, const FieldOptions& field) : views(used_cone(scan, field).views) {

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "host/base/system/limits.hpp"
+#include "host/base/system/lower.hpp"
 #include "host/files/io/text_encoding.hpp"
 #include "vdvr/error.hpp"
 
@@ -29,12 +30,6 @@ std::string trimmed(const std::string& text) {
   const auto first = text.find_first_not_of(" \t\r\n");
   if (first == std::string::npos) return "";
   return text.substr(first, text.find_last_not_of(" \t\r\n") - first + 1);
-}
-
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
 }
 
 // What a header may hold, parsed: the fields, and where the samples start when they follow it.

@@ -10,22 +10,16 @@
 #include <fstream>
 #include <vector>
 
+#include "host/base/system/limits.hpp"
 #include "host/files/io/raster_file.hpp"
+#include "host/base/system/lower.hpp"
 #include "host/files/io/volume_samples.hpp"
 #include "host/files/io/volume_stack.hpp"
-#include "host/base/system/limits.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/output_file.hpp"
 
 namespace vdvr {
 namespace {
-
-std::string extension_of(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
-}
 
 std::string mha_header(const Grid& grid) {
   const Index3 n = grid.samples();
@@ -107,7 +101,7 @@ std::filesystem::path file_of_volume(const std::filesystem::path& path) {
 }
 
 bool is_volume_path(const std::filesystem::path& path) {
-  const std::string e = extension_of(path);
+  const std::string e = lower_extension(path);
   return e == ".mha" || e == ".mhd" || e == ".nrrd" || e == ".nhdr";
 }
 
@@ -155,7 +149,7 @@ struct VolumeWriter::File {
 };
 
 VolumeWriter::VolumeWriter(const std::filesystem::path& path, const Grid& grid) {
-  const std::string extension = extension_of(path);
+  const std::string extension = lower_extension(path);
   if (extension != ".mha" && extension != ".nrrd")
     throw InputError(fmt::format("{}: volumes are written as .mha or .nrrd", path.string()));
   if (grid.unit.find_first_of("\n\r\"") != std::string::npos)

@@ -5,13 +5,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/base/system/limits.hpp"
+#include "host/base/system/read_in_child.hpp"
 #include "host/files/hdf5/hdf5_reader.hpp"
 #include "host/files/io/natural_order.hpp"
 #include "host/files/io/number_text.hpp"
+#include "host/base/system/lower.hpp"
 #include "host/files/io/tiff.hpp"
 #include "host/files/io/volume_samples.hpp"
-#include "host/base/system/limits.hpp"
-#include "host/base/system/read_in_child.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -20,13 +21,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uint64_t kSlabBytes = std::uint64_t{32} << 20;
-
-std::string lower_extension(const fs::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
-}
 
 // --- HDF5 ---
 

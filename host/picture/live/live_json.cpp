@@ -263,8 +263,4 @@ std::string to_json(const LiveScene& scene) {
   return json.dump();
 }
 
-std::string transfer_text(const TransferFunction& transfer) {
-  return Json{{"points", transfer_json(transfer)}}.dump(2) + "\n";
-}
-
 }  // namespace vdvr

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "host/scan/geometry/vectors.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -42,10 +43,6 @@ OrbitFrame first_frame(const MixedVolume& volume, const Brightness& brightness) 
 
 void require(bool good, const std::string& what) {
   if (!good) throw InputError(what);
-}
-
-Vec3 cross(const Vec3& a, const Vec3& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
 Vec3 unit(const Vec3& v) {

@@ -5,15 +5,13 @@
 #include <limits>
 #include <numbers>
 
+#include "host/scan/geometry/vectors.hpp"
+
 namespace vdvr {
 namespace {
 
 constexpr double pi = std::numbers::pi;
 
-double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-double length(const Vec3& a) { return std::hypot(a[0], a[1], a[2]); }
-Vec3 scaled(const Vec3& a, double s) { return {a[0] * s, a[1] * s, a[2] * s}; }
-Vec3 minus(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 double to_the_24th(double x) { return std::pow(x, 24); }
 
 // Where light and eye stand opposite there is no direction half-way, and no light either.

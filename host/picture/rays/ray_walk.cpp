@@ -2,12 +2,11 @@
 
 #include <limits>
 
+#include "host/scan/geometry/vectors.hpp"
+
 namespace vdvr {
 namespace {
 
-Vec3 cross(const Vec3& a, const Vec3& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
 Vec3 unit(const Vec3& a) {
   const double n = std::hypot(a[0], a[1], a[2]);
   return {a[0] / n, a[1] / n, a[2] / n};

@@ -10,6 +10,8 @@
 #include <numbers>
 #include <numeric>
 
+#include "host/scan/geometry/vectors.hpp"
+#include "host/base/system/casts.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -25,8 +27,6 @@ constexpr double kOpaque = 4;  // extinction: two percent pass
 constexpr double kSpeckWeight = 1e-3, kSpeckSide = 1.0 / 16;
 constexpr double kMargin = 0.95;
 constexpr double kDegree = std::numbers::pi / 180;
-
-std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 /// Extinction by value, so that a sample costs one look-up.
 class Extinction {
@@ -134,8 +134,6 @@ Axes axes_of(double azimuth_deg, double elevation_deg) {
   // `up` is the derivative of the direction to the eye by elevation: defined at the poles too.
   return {{ca, -sa, 0}, {-se * sa, -se * ca, -ce}, {-ce * sa, -ce * ca, se}};
 }
-
-double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 /// Faint blocks that are seen because many lie behind each other, along one direction of view: in square bins
 /// across it, those that have a quarter of what the others have at least. Less, before or behind them, is
@@ -281,8 +279,6 @@ struct Reach {
 void require(const std::vector<Vec3>& points) {
   if (points.empty()) throw InputError("a camera cannot frame nothing: there are no points");
 }
-
-Vec3 minus(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 
 double aspect_of(const RenderOptions& o) {
   return static_cast<double>(o.width) / static_cast<double>(o.height);

@@ -44,6 +44,19 @@ Description Description::member(const std::string& key, const std::set<std::stri
   return {file_, within_ + key + ".", json_.at(key), known};
 }
 
+std::vector<Description> Description::members(const std::string& key,
+                                              const std::set<std::string>& known) const {
+  if (!has(key) || !is_list(key) || json_.at(key).empty())
+    fail(fmt::format("{} must be a list of at least one object", quoted(key)));
+  std::vector<Description> all;
+  for (const json& item : json_.at(key)) {
+    const std::string name = fmt::format("{}[{}]", key, all.size());
+    if (!item.is_object()) fail(fmt::format("{} must be an object", quoted(name)));
+    all.push_back({file_, within_ + name + ".", item, known});
+  }
+  return all;
+}
+
 void Description::require_known(const std::set<std::string>& known) const {
   for (const auto& [key, value] : json_.items())
     if (!known.contains(key)) fail(fmt::format("member {} is unknown", quoted(key)));
@@ -102,6 +115,12 @@ std::vector<double> Description::numbers(const std::string& key) const {
     all.push_back(item.get<double>());
   }
   return all;
+}
+
+Vec3 Description::vec3(const std::string& key) const {
+  const auto v = numbers(key);
+  if (v.size() != 3) fail(fmt::format("{} must be three numbers [x, y, z]", quoted(key)));
+  return {v[0], v[1], v[2]};
 }
 
 std::pair<double, double> Description::pair(const std::string& key) const {

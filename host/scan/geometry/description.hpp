@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "vdvr/expert/grid.hpp"
+
 namespace vdvr::io {
 
 class Description {
@@ -18,6 +20,10 @@ class Description {
   Description(std::filesystem::path file, const std::set<std::string>& known);
   /// The object that is member `key`.
   [[nodiscard]] Description member(const std::string& key, const std::set<std::string>& known) const;
+
+  /// The objects that the list `key` holds, at least one.
+  [[nodiscard]] std::vector<Description> members(const std::string& key,
+                                                 const std::set<std::string>& known) const;
 
   [[noreturn]] void fail(const std::string& what) const;
   [[nodiscard]] bool has(const std::string& key) const { return json_.contains(key); }
@@ -41,6 +47,7 @@ class Description {
   [[nodiscard]] std::int64_t integer(const std::string& key) const;
   [[nodiscard]] std::vector<std::string> texts(const std::string& key) const;
   [[nodiscard]] std::vector<double> numbers(const std::string& key) const;
+  [[nodiscard]] Vec3 vec3(const std::string& key) const;
   /// One number, which stands for both, or [u, v].
   [[nodiscard]] std::pair<double, double> pair(const std::string& key) const;
   /// A list of lists of `width` numbers, one after the other.

@@ -5,12 +5,11 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <numbers>
 #include <set>
 
+#include "host/base/system/lower.hpp"
 #include "host/scan/geometry/description.hpp"
 #include "host/scan/geometry/vectors.hpp"
 
@@ -28,12 +27,6 @@ const std::set<std::string> known_members{
 const std::set<std::string> modular_members{"rowVectors", "colVectors", "moduleCenters", "sourcePositions"};
 const std::set<std::string> circular_members{"centerRow", "centerCol", "phis",         "angularRange", "sod",
                                              "sdd",       "tau",       "helicalPitch", "tiltAngle"};
-
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
 
 // Whether it is modular beam; throws for what is neither that nor a flat circular scan.
 bool is_modular(const Description& about) {

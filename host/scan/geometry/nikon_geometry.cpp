@@ -13,6 +13,7 @@
 
 #include "host/files/io/number_text.hpp"
 #include "host/files/io/text_encoding.hpp"
+#include "host/files/io/volume_stack.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {
@@ -75,20 +76,13 @@ class Members {
   std::map<std::string, std::string> values_;
 };
 
-bool is_tiff_name(const std::string& name) {
-  std::string end = fs::path(name).extension().string();
-  std::transform(end.begin(), end.end(), end.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return end == ".tif" || end == ".tiff";
-}
-
 // Names within `folder`, relative to the scan's folder.
 std::vector<std::string> tiffs_in(const fs::path& folder, const NikonScan& nikon, const Description& scan) {
   std::error_code error;
   if (!fs::is_directory(scan.folder() / folder, error)) return {};
   std::vector<std::string> all = scan.matches((folder / "*").generic_string(), "nikon");
   std::erase_if(all, [&](const std::string& name) {
-    return !is_tiff_name(name) || fs::path(name).filename().string().rfind(nikon.name, 0) != 0;
+    return !is_tiff_path(name) || fs::path(name).filename().string().rfind(nikon.name, 0) != 0;
   });
   return all;
 }

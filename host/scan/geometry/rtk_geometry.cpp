@@ -6,11 +6,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
+#include <pugixml.hpp>
+#include <string_view>
 
 #include "host/files/io/number_text.hpp"
 #include "host/files/io/text_encoding.hpp"
-#include "host/files/io/xml_file.hpp"
+#include "host/scan/geometry/vectors.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -23,7 +26,6 @@ constexpr double same_matrix = 1e-9;
 double dot_rows(const ViewMatrix& m, std::size_t a, std::size_t b) {
   return m[a][0] * m[b][0] + m[a][1] * m[b][1] + m[a][2] * m[b][2];
 }
-double along(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 // The largest difference of the matrices, each row relative to its largest entries: those that multiply
 // lengths, and the last.
@@ -70,8 +72,8 @@ CircularView circular_parameters(const ViewMatrix& matrix, double pitch_u, doubl
   out.pitch_v = pitch_v;
   out.center = center;
   out.row = row;
-  out.source_offset_u = along(view.source, view.along_u);
-  out.source_offset_v = along(view.source, view.along_v);
+  out.source_offset_u = dot(view.source, view.along_u);
+  out.source_offset_v = dot(view.source, view.along_v);
   // The pixel that the normal through the source hits.
   const double depth2 = dot_rows(matrix, 2, 2), foot_u = dot_rows(matrix, 0, 2) / depth2,
                foot_v = dot_rows(matrix, 1, 2) / depth2;
@@ -129,6 +131,9 @@ std::string rtk_geometry_text(const ConeGeometry& cone, const StackPlace& stack)
 namespace io {
 namespace {
 
+constexpr std::uintmax_t largest_file = 64u << 20;
+constexpr std::ptrdiff_t most_tags = 1 << 20;  // some 40,000 views of RTK's
+
 // RTK's own tolerance, absolute: what fewer digits in a file leave.
 constexpr double same_rtk_matrix = 1e-3;
 
@@ -161,15 +166,15 @@ class RtkReader {
       : path_(std::move(path)), header_(header), stack_(stack) {}
 
   ConeViews read() {
-    const XmlElement root = read_xml(path_);
-    if (root.name != "RTKThreeDCircularGeometry")
-      fail(root, fmt::format("the root is '{}'; RTKThreeDCircularGeometry is needed", root.name));
-    const auto version = root.attributes.find("version");
-    if (version == root.attributes.end() || (version->second != "2" && version->second != "3"))
+    const pugi::xml_node root = document();
+    if (name_of(root) != "RTKThreeDCircularGeometry")
+      fail(root, fmt::format("the root is '{}'; RTKThreeDCircularGeometry is needed", root.name()));
+    const std::string_view version = root.attribute("version").value();
+    if (version != "2" && version != "3")
       fail(root, fmt::format("version '{}'; 2 and 3 can be read, so write the file again with a newer RTK",
-                             version == root.attributes.end() ? "" : version->second));
-    for (const XmlElement& element : root.children) {
-      if (element.name == "Projection") projection(element);
+                             version));
+    for (const pugi::xml_node& element : root.children()) {
+      if (name_of(element) == "Projection") projection(element);
       else parameter(element);
     }
     require_views(path_.string(), "projections described", static_cast<std::int64_t>(out_.views.size()),
@@ -179,41 +184,68 @@ class RtkReader {
   }
 
  private:
-  [[noreturn]] void fail(const XmlElement& at, const std::string& what) const {
-    throw FileError(fmt::format("{}: line {}: {}", path_.string(), at.line, what));
+  [[noreturn]] void fail_at(std::ptrdiff_t offset, const std::string& what) const {
+    throw FileError(fmt::format("{}: line {}: {}", path_.string(),
+                                1 + std::count(text_.begin(), text_.begin() + offset, '\n'), what));
   }
-  double number(const XmlElement& element) const {
-    const auto value = number_of(element.text);
-    if (!value || !element.children.empty())
-      fail(element, fmt::format("{} is '{}', not a number{}", element.name, element.text.substr(0, 40),
-                                comma_hint(element.text)));
+  [[noreturn]] void fail(const pugi::xml_node& at, const std::string& what) const {
+    fail_at(std::max<std::ptrdiff_t>(at.offset_debug(), 0), what);
+  }
+  // The root. No document type is looked into, and no entity known but the five of the language.
+  pugi::xml_node document() {
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(path_, error))
+      throw FileError(path_.string() + ": no such file, or not readable");
+    text_ = read_text(path_, "a geometry file", largest_file);
+    if (std::count(text_.begin(), text_.end(), '<') > most_tags)
+      throw FileError(fmt::format("{}: more than {} tags", path_.string(), most_tags));
+    const auto parsed =
+        document_.load_buffer(text_.data(), text_.size(), pugi::parse_default, pugi::encoding_utf8);
+    if (!parsed) fail_at(parsed.offset, fmt::format("{}: not XML, or truncated", parsed.description()));
+    const pugi::xml_node root = document_.document_element();
+    if (const auto next = root.next_sibling()) fail(next, "something follows the root element");
+    return root;
+  }
+  static std::string name_of(const pugi::xml_node& node) { return node.name(); }
+  // What an element holds beside comments; nothing where that is more than one piece of text.
+  static std::string text_of(const pugi::xml_node& element) {
+    const pugi::xml_node only = element.first_child();
+    return only.type() == pugi::node_pcdata && !only.next_sibling() ? only.value() : "";
+  }
+  double number(const pugi::xml_node& element) const {
+    const std::string text = text_of(element);
+    const auto value = number_of(text);
+    if (!value)
+      fail(element,
+           fmt::format("{} is '{}', not a number{}", element.name(), text.substr(0, 40), comma_hint(text)));
     return *value;
   }
 
-  void parameter(const XmlElement& element) {
-    if (double* place = place_of(parameters_, element.name)) {
+  void parameter(const pugi::xml_node& element) {
+    const std::string name = name_of(element);
+    if (double* place = place_of(parameters_, name)) {
       *place = number(element);
-    } else if (element.name == "RadiusCylindricalDetector") {
+    } else if (name == "RadiusCylindricalDetector") {
       if (const double radius = number(element); radius != 0)
         fail(element, fmt::format("RadiusCylindricalDetector is {}; only flat detectors are supported: "
                                   "resample the projections to a plane",
                                   radius));
-    } else if (element.name.rfind("Collimation", 0) == 0) {
+    } else if (name.starts_with("Collimation")) {
       // RTK writes the largest number of its type where there is no jaw.
       if (const double jaw = number(element); std::abs(jaw) < 1e300)
         fail(element,
-             fmt::format("{} is {}; jaws within the detector are not supported: crop the projections",
-                         element.name, jaw));
+             fmt::format("{} is {}; jaws within the detector are not supported: crop the projections", name,
+                         jaw));
     } else {
-      fail(element, fmt::format("element '{}' is unknown", element.name));
+      fail(element, fmt::format("element '{}' is unknown", name));
     }
   }
 
-  void projection(const XmlElement& element) {
+  void projection(const pugi::xml_node& element) {
     const auto k = static_cast<std::int64_t>(out_.views.size());
-    const XmlElement* matrix = nullptr;
-    for (const XmlElement& child : element.children) {
-      if (child.name == "Matrix") matrix = &child;
+    pugi::xml_node matrix;
+    for (const pugi::xml_node& child : element.children()) {
+      if (name_of(child) == "Matrix") matrix = child;
       else parameter(child);
     }
     const Parameters& p = parameters_;
@@ -236,14 +268,14 @@ class RtkReader {
     view.center = -header_.origin[0] / header_.spacing[0];
     view.row = -header_.origin[1] / header_.spacing[1];
     out_.views.push_back(checked_view(view, path_.string(), k));
-    if (matrix) check(*matrix, rtk_matrix(view), k);
+    if (matrix) check(matrix, rtk_matrix(view), k);
     // Of all views or of none.
     out_.source_to_detector = k == 0 || out_.source_to_detector == p.sdd ? p.sdd : 0;
   }
 
-  void check(const XmlElement& element, const ViewMatrix& computed, std::int64_t k) const {
-    const auto values = numbers_of(element.text, 12);
-    if (!values || values->size() != 12 || !element.children.empty())
+  void check(const pugi::xml_node& element, const ViewMatrix& computed, std::int64_t k) const {
+    const auto values = numbers_of(text_of(element), 12);
+    if (!values || values->size() != 12)
       fail(element, fmt::format("view {}: Matrix must hold 3 x 4 numbers", k));
     for (std::size_t i = 0; i < 12; ++i)
       if (!(std::abs((*values)[i] - computed[i / 4][i % 4]) <= same_rtk_matrix))
@@ -268,6 +300,8 @@ class RtkReader {
   }
 
   std::filesystem::path path_;
+  std::string text_;
+  pugi::xml_document document_;
   const RasterHeader& header_;
   StackShape stack_;
   Parameters parameters_;

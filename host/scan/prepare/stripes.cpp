@@ -5,12 +5,11 @@
 #include <numbers>
 #include <numeric>
 
+#include "host/base/system/casts.hpp"
 #include "host/scan/prepare/view_filters.hpp"
 
 namespace vdvr {
 namespace {
-
-std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 // Median of `window` neighbours, mirrored at the ends.
 std::vector<double> median_along(const double* row, std::int64_t n, int window) {

@@ -4,10 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <array>
 
 #include "host/base/system/limits.hpp"
+#include "host/base/system/lower.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {
@@ -57,9 +57,7 @@ void read_run(const FrameStack& stack, std::int64_t first, std::int64_t n, doubl
 // As whoever wrote it spells it: Degrees, DEG, Radians.
 AngleUnit unit_of_angles(const Reader& file, const std::string& object, const std::string& name) {
   const std::string written = file.find_text(object, "units").value_or("degrees");
-  std::string unit = written;
-  std::transform(unit.begin(), unit.end(), unit.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string unit = lower(written);
   if (unit.rfind("rad", 0) == 0) return AngleUnit::radians;
   if (unit.rfind("deg", 0) == 0 || unit == "\u00b0" || unit.empty()) return AngleUnit::degrees;
   throw FileError(fmt::format("{}: units '{}'; degrees or radians are needed (`angle_unit` states which)",

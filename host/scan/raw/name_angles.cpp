@@ -8,6 +8,8 @@
 #include <cmath>
 #include <filesystem>
 
+#include "host/base/system/lower.hpp"
+
 namespace vdvr::io {
 namespace {
 
@@ -43,9 +45,8 @@ bool is_word_of_angles(const std::string& name, std::size_t first, std::size_t e
     for (std::size_t i = first - 1; i > 0 && is_letter(name[i - 1]); --i)
       before.insert(before.begin(), name[i - 1]);
   for (std::size_t i = end; i < name.size() && is_letter(name[i]); ++i) after += name[i];
-  for (std::string* word : {&before, &after})
-    std::transform(word->begin(), word->end(), word->begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  before = lower(before);
+  after = lower(after);
   const bool degree_sign = name.compare(end, 2, "\u00b0") == 0;
   return degree_sign || after.starts_with("deg") || before == "deg" || before == "ang" || before == "angle" ||
          before == "theta" || before == "degree" || before == "degrees";

@@ -8,13 +8,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <initializer_list>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <utility>
 
+#include "host/scan/geometry/description.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/simulate.hpp"
 
@@ -115,61 +114,6 @@ json to_json(const std::vector<Ellipsoid>& ellipsoids, double background) {
   return {{"ellipsoids", list}, {"background", background}};
 }
 
-// --- the JSON form ---
-
-// Reads members of one object and names path and member in every refusal.
-class Reader {
- public:
-  Reader(const json& object, std::string where, std::initializer_list<const char*> known)
-      : object_(object), where_(std::move(where)) {
-    if (!object.is_object()) throw FileError(fmt::format("{}: not a JSON object", where_));
-    for (const auto& [key, value] : object.items()) {
-      bool found = false;
-      for (const char* name : known) found = found || key == name;
-      if (!found)
-        throw FileError(
-            fmt::format("{}: unknown member \"{}\"; known: {}", where_, key, fmt::join(known, ", ")));
-    }
-  }
-  [[nodiscard]] bool has(const char* member) const { return object_.contains(member); }
-  [[nodiscard]] const json& member(const char* name) const {
-    if (!has(name)) throw FileError(fmt::format("{}: member \"{}\" is missing", where_, name));
-    return object_.at(name);
-  }
-  [[nodiscard]] double number(const char* name) const { return number(member(name), name); }
-  [[nodiscard]] double number_or(const char* name, double otherwise) const {
-    return has(name) ? number(name) : otherwise;
-  }
-  [[nodiscard]] Vec3 vector(const char* name) const {
-    const json& value = member(name);
-    if (!value.is_array() || value.size() != 3)
-      throw FileError(
-          fmt::format("{}: \"{}\" is {}; three numbers [x, y, z] are expected", where_, name, value.dump()));
-    return {number(value[0], name), number(value[1], name), number(value[2], name)};
-  }
-
- private:
-  [[nodiscard]] double number(const json& value, const char* name) const {
-    if (!value.is_number())
-      throw FileError(fmt::format("{}: \"{}\" holds {}; a number is expected", where_, name, value.dump()));
-    return value.get<double>();
-  }
-  const json& object_;
-  std::string where_;
-};
-
-json parse(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file || std::filesystem::is_directory(path))
-    throw FileError(
-        fmt::format("{}: cannot be read; give a JSON file of ellipsoids (docs/phantoms.md)", path.string()));
-  try {
-    return json::parse(file);
-  } catch (const json::exception& e) {
-    throw FileError(fmt::format("{}: not valid JSON: {}", path.string(), e.what()));
-  }
-}
-
 }  // namespace
 
 Phantom ellipsoid_list(std::vector<Ellipsoid> ellipsoids, double background, std::string name) {
@@ -239,23 +183,16 @@ Phantom shepp_logan(double unit) {
 }
 
 Phantom read_phantom(const std::filesystem::path& path) {
-  const json text = parse(path);
-  const Reader top(text, path.string(), {"ellipsoids", "background", "name", "comment"});
-  const json& list = top.member("ellipsoids");
-  if (!list.is_array() || list.empty())
-    throw FileError(
-        fmt::format("{}: \"ellipsoids\" must be a list of at least one ellipsoid", path.string()));
+  const io::Description file(path, {"ellipsoids", "background", "name", "comment"});
   std::vector<Ellipsoid> ellipsoids;
-  for (std::size_t i = 0; i < list.size(); ++i) {
-    const Reader item(list[i], fmt::format("{}: ellipsoids[{}]", path.string(), i),
-                      {"density", "center", "semi_axes", "phi_deg", "comment"});
-    ellipsoids.push_back({item.number("density"), item.vector("center"), item.vector("semi_axes"),
-                          item.number_or("phi_deg", 0)});
-  }
+  for (const io::Description& e :
+       file.members("ellipsoids", {"density", "center", "semi_axes", "phi_deg", "comment"}))
+    ellipsoids.push_back(
+        {e.number("density"), e.vec3("center"), e.vec3("semi_axes"), e.number_or("phi_deg", 0)});
   try {
-    return ellipsoid_list(std::move(ellipsoids), top.number_or("background", 0), path.filename().string());
+    return ellipsoid_list(std::move(ellipsoids), file.number_or("background", 0), path.filename().string());
   } catch (const InputError& e) {
-    throw FileError(fmt::format("{}: {}", path.string(), e.what()));
+    file.fail(e.what());
   }
 }
 

@@ -25,10 +25,6 @@ VDVR_API double centre_error(std::span<const double> kappa);
 /// axes; throws InputError for more.
 VDVR_API double wave_error_bound(std::span<const double> kappa);
 
-/// sum_j (2 - kappa_j cot(kappa_j / 2))^2 <= 4 centre_error: the cell's centre is a local maximum of the
-/// error. That it is then the largest is observed, and proved only from kExactProduct on.
-VDVR_API bool centre_is_local_maximum(std::span<const double> kappa);
-
 /// The largest worst error of all waves up to Nyquist, in the outermost corner: 1, 1.0618, 1.0963 for 1, 2, 3
 /// axes, rounded up by at most 1e-4.
 VDVR_API double largest_wave_error(int axes);

@@ -25,7 +25,5 @@ VDVR_API std::string to_json(const LiveState& state);
 /// What a page must know of the volume: {"grid", "range", "bulk", "histogram", "threshold", "has_bounds",
 /// "epsilon_abs", "unit"}.
 VDVR_API std::string to_json(const LiveScene& scene);
-/// The file that `vdvr render --tf` reads.
-VDVR_API std::string transfer_text(const TransferFunction& transfer);
 
 }  // namespace vdvr

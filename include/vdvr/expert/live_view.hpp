@@ -67,7 +67,7 @@ VDVR_API RenderOptions options_of(const LiveView& view, const LiveScene& scene, 
                                   std::int64_t height);
 
 /// The options of `vdvr render` that draw this view at this size, to be put behind `vdvr render FILE -o X`.
-/// The transfer function and the bound's colours are not among them: `--tf` takes a file (transfer_text).
+/// The transfer function and the bound's colours are not among them: `--tf` takes a file.
 VDVR_API std::vector<std::string> render_words(const LiveView& view, const LiveScene& scene,
                                                std::int64_t width, std::int64_t height);
 

@@ -22,8 +22,6 @@ namespace vdvr {
 struct SigmaRange {
   double least = 0, median = 0, largest = 0;
 };
-/// Throws InputError where no sample is covered.
-VDVR_API SigmaRange sigma_range(const Volume& sigma, const ProjectionSet& scan, const FieldOptions& field);
 
 /// Sigma of F brick by brick.
 struct BrickSigma {
@@ -32,7 +30,7 @@ struct BrickSigma {
   std::vector<float> of_brick;
   SigmaRange range;
 };
-/// `sigma`: on noise_grid(grid, granularity). Throws what sigma_range() throws.
+/// `sigma`: on noise_grid(grid, granularity). Throws InputError where no sample is covered.
 VDVR_API BrickSigma brick_sigma(const Volume& sigma, const ProjectionSet& scan, const FieldOptions& field,
                                 const Grid& grid, int granularity);
 /// The same of a plan, by one more back-projection (noise_of_field).

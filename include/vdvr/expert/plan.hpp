@@ -63,9 +63,8 @@ struct Plan {
                 memory_of_cells = 0;  ///< of those, what grows with the rows, with the grid
   std::uint64_t tile_bytes = 0;       ///< of tiles before closing, wherever they lie
   double seconds = 0;                 ///< foreseen for build, from a measured back-projection rate
-  double seconds_of_rows = 0;    ///< of those, what grows with the detector's rows and not with the grid's
-  double seconds_of_levels = 0;  ///< and what classifying and measuring once takes
-  double samples_ratio = 0;      ///< storage foreseen, from a sample of bricks
+  double seconds_of_rows = 0;  ///< of those, what grows with the detector's rows and not with the grid's
+  double samples_ratio = 0;    ///< storage foreseen, from a sample of bricks
   std::int64_t not_covered_count = 0;
   double not_covered_fraction = 0;
   Volume base;             ///< the 1x reconstruction it rests on; of an estimate, that of its rows
