@@ -3,6 +3,7 @@
 #include "apps/vdvr/commands/bench_tune.hpp"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/options.hpp"
