@@ -1,6 +1,7 @@
 #include "apps/common/common_options.hpp"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "vdvr/expert/scratch.hpp"
 #include "vdvr/expert/trust.hpp"

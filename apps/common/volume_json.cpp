@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <nlohmann/json.hpp>
 
 namespace vdvr::cli {
 namespace {

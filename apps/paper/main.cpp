@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <nlohmann/json.hpp>
 
 #include "apps/common/command.hpp"
 #include "apps/common/completion.hpp"

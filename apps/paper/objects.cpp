@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "apps/paper/report.hpp"
 #include "apps/paper/scans.hpp"

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <nlohmann/json.hpp>
 
 #include "apps/paper/report.hpp"
 #include "vdvr/expert/cosine_spectrum.hpp"

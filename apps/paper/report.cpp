@@ -1,6 +1,7 @@
 #include "apps/paper/report.hpp"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "vdvr/error.hpp"
 #include "vdvr/expert/output_file.hpp"

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <vector>
+#include <nlohmann/json.hpp>
 
 #include "apps/common/common_options.hpp"
 #include "apps/common/output_folder.hpp"

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <nlohmann/json.hpp>
 
 #include "apps/paper/report.hpp"
 #include "vdvr/expert/cosine_spectrum.hpp"

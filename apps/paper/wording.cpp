@@ -1,5 +1,6 @@
 // What the sections share: wording, JSON of measures, views.
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "apps/common/volume_json.hpp"
 #include "apps/paper/report.hpp"

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <utility>
+#include <nlohmann/json.hpp>
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/crew.hpp"

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "apps/vdvr/certify_options.hpp"
 #include "apps/vdvr/clip.hpp"

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <nlohmann/json.hpp>
 
 #include "apps/vdvr/overlay.hpp"
 #include "apps/vdvr/picture_tolerance.hpp"

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <nlohmann/json.hpp>
 
 #include "vdvr/error.hpp"
 #include "vdvr/expert/rtk_geometry.hpp"

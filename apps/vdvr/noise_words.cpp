@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"

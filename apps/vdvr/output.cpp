@@ -7,6 +7,7 @@
 #include <set>
 
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include "apps/common/messages.hpp"
 #include "vdvr/expert/certify.hpp"

@@ -1,6 +1,7 @@
 #include "apps/vdvr/picture_forecast.hpp"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "apps/vdvr/output.hpp"
 

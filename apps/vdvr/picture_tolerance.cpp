@@ -1,6 +1,7 @@
 #include "apps/vdvr/picture_tolerance.hpp"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "vdvr/error.hpp"
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "apps/common/messages.hpp"
 #include "apps/vdvr/cone.hpp"

@@ -1,5 +1,7 @@
 #include "apps/vdvr/sampler_json.hpp"
 
+#include <nlohmann/json.hpp>
+
 #include "vdvr/certified_picture.hpp"
 
 namespace vdvr::cli {

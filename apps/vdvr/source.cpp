@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "apps/vdvr/crew.hpp"
 #include "apps/vdvr/inputs.hpp"

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <nlohmann/json.hpp>
 
 #include "apps/common/messages.hpp"
 #include "apps/vdvr/cone.hpp"

@@ -2,7 +2,7 @@
 // the certificate promises of them.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "vdvr/export_volume.hpp"

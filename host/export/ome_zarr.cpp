@@ -10,6 +10,7 @@
 #include <cmath>
 #include <fstream>
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "host/export/pack.hpp"
 #include "host/volume/sampler/sample_box.hpp"

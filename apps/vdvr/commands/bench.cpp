@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <numbers>
+#include <nlohmann/json.hpp>
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/certify.hpp"

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/certify.hpp"

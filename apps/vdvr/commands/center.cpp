@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/inputs.hpp"

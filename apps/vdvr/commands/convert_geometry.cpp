@@ -1,5 +1,6 @@
 // vdvr convert-geometry: a cone-beam scan's geometry as RTK's XML.
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/inputs.hpp"

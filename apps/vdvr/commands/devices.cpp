@@ -1,5 +1,6 @@
 // vdvr devices: platforms, devices, limits, which sampler and why.
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "apps/vdvr/command.hpp"
 #include "apps/vdvr/options.hpp"

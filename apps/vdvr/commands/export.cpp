@@ -1,5 +1,6 @@
 // vdvr export: a certified volume as files of other programs: uniform ones, and VTK's boxes of bricks.
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/inputs.hpp"

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <nlohmann/json.hpp>
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/noise_words.hpp"

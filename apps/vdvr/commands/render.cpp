@@ -1,5 +1,6 @@
 // vdvr render: a picture, the values behind it, or a turntable.
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/certify_options.hpp"

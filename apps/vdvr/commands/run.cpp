@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <fstream>
 #include <iterator>
+#include <nlohmann/json.hpp>
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/certify.hpp"

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "apps/common/output_folder.hpp"
 #include "apps/common/progress.hpp"
