@@ -7,6 +7,7 @@
 #include <array>
 #include <cstdio>
 #include <fstream>
+#include <nlohmann/json.hpp>
 
 #include "host/files/io/tiff_messages.hpp"
 #include "host/base/system/limits.hpp"

@@ -5,6 +5,7 @@
 
 #include <bit>
 #include <fstream>
+#include <nlohmann/json.hpp>
 
 #include "host/base/system/limits.hpp"
 #include "vdvr/error.hpp"

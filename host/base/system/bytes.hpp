@@ -68,7 +68,8 @@ class ByteWriter {
   Bytes take() { return std::move(bytes_); }
 
  private:
-  void append(const void* from, std::size_t n) {
+  // Inlined as often as messages have members, it makes GCC 12 warn of sizes that cannot be.
+  [[gnu::noinline]] void append(const void* from, std::size_t n) {
     if (n == 0) return;
     const std::size_t before = bytes_.size();
     bytes_.resize(before + n);
