@@ -46,7 +46,7 @@ struct PictureRequest {
   bool lit = false;                 ///< of mode dvr, on one device: under the light of F itself
   bool keep_steps = false;          ///< draw as `options` say: no finer, no other classification or step mode
   std::optional<double> tolerance;  ///< levels that every pixel shall be certain to: drawn finer for it
-  /// For a certificate that does not say it (files of earlier versions).
+  /// Counts only where the certificate does not say it (files of earlier versions).
   std::optional<CoveredCylinder> covered;
 };
 
@@ -82,7 +82,8 @@ struct CertifiedPicture {
 /// one to six pictures, and certify_pixels() or CertifiedRays.
 VDVR_API CertifiedPicture certify_picture(DrawnVolume& volume, const Certificate& here,
                                           const PictureRequest& request, const Progress& progress = {});
-/// The same of a file (read_certified), on one device, by the sampler for which its certificate holds there.
+/// The same of a file, on one device, by the sampler for which its certificate holds there. Throws
+/// MismatchError too, for a file that was altered.
 VDVR_API CertifiedPicture certify_picture(Device& device, const VdvrFile& file, const PictureRequest& request,
                                           const Progress& progress = {});
 
@@ -130,7 +131,8 @@ struct VerifyPictureOptions {
 };
 /// Draws and certifies again what X.certificate.json describes, and compares: the file beside it, the pixels,
 /// the statement, every number. Throws FileError for what is no certificate of a picture, MismatchError for
-/// one of another volume, ResourceError where the device cannot draw it; DeviceError, Interrupted.
+/// one of another volume and for a volume that was altered, ResourceError where the device cannot draw it;
+/// DeviceError, Interrupted.
 VDVR_API PictureVerification verify_picture(Device& device, const VdvrFile& file,
                                             const std::filesystem::path& certificate,
                                             const VerifyPictureOptions& options = {},

@@ -32,6 +32,17 @@ inline std::optional<ScanNoise> find_noise(const ProjectionSet& scan, const Nois
   return read_scan_noise(source->path, source->how, scan, options, &why);
 }
 
+/// Beside a tolerance of another kind; no build fails for want of it.
+inline std::optional<ScanNoise> noted_noise(const ProjectionSet& scan, const Asked& asked) {
+  try {
+    std::string why;
+    return find_noise(scan, asked.noise, asked.source, why);
+  } catch (const Error& e) {
+    if (e.kind() == ErrorKind::interrupted) throw;
+    return std::nullopt;
+  }
+}
+
 /// Of a tolerance in sigma; throws InputError where the noise is neither stated nor found.
 inline ScanNoise known_noise(const ProjectionSet& scan, const Asked& asked) {
   std::string why;

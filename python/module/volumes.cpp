@@ -48,9 +48,7 @@ Held held_of(BuildResult&& built) {
 
 BuildResult certified(Device& device, const ProjectionSet& scan, const Asked& asked,
                       const CertifyOptions& options, const Progress& report) {
-  std::string why;
-  const auto noise = asked.sigmas ? std::optional(known_noise(scan, asked))
-                                  : find_noise(scan, asked.noise, asked.source, why);
+  const auto noise = asked.sigmas ? std::optional(known_noise(scan, asked)) : noted_noise(scan, asked);
   return certify_scan(device, scan, {asked.tolerance, asked.sigmas}, noise, options, report);
 }
 
@@ -257,7 +255,10 @@ void add_volumes(nb::module_& m) {
       .def_prop_ro("content_sha256", [](HeldVolume& h) { return content_sha256(h.file().volume); })
       .def_prop_ro("has_geometry",
                    [](HeldVolume& h) { return noted_geometry(h.file().certificate).has_value(); })
-      .def_prop_ro("brightness", [](HeldVolume& h) { return h.brightness(); })
+      // Whoever draws holds the lock that it takes.
+      .def_prop_ro(
+          "brightness", [](HeldVolume& h) { return h.brightness(); },
+          nb::call_guard<nb::gil_scoped_release>())
       .def("levels", &levels)
       .def("values", &values_at, "points"_a)
       .def("bounds", &bounds_at, "points"_a)

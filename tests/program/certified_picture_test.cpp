@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -130,6 +131,20 @@ BOOST_AUTO_TEST_CASE(what_cannot_be_certified_is_refused_and_leaves_nothing) {
   request = request_of(RenderMode::dvr);
   request.options.clip = Clip{{900, 900, -900}, {901, 901, 900}};
   refused(request, "clip");
+  request.options.clip = Clip{};
+  request.options.clip->axis = {1, 0};
+  refused(request, "clip");
+  request.options.clip = Clip{};
+  request.options.clip->low[1] = std::numeric_limits<double>::quiet_NaN();
+  refused(request, "clip");
+  VdvrFile altered = file();
+  altered.altered = "its seal is broken";
+  BOOST_CHECK_THROW(static_cast<void>(certify_picture(device(), altered, request_of(RenderMode::dvr))),
+                    MismatchError);
+  VdvrFile better = file();
+  better.certificate.total_buffer /= 2;
+  BOOST_CHECK_THROW(static_cast<void>(certify_picture(device(), better, request_of(RenderMode::dvr))),
+                    MismatchError);
   VdvrFile other = file();
   other.certificate.comparison = true;
   BOOST_CHECK_THROW(static_cast<void>(certify_picture(device(), other, request_of(RenderMode::dvr))),
@@ -139,6 +154,16 @@ BOOST_AUTO_TEST_CASE(what_cannot_be_certified_is_refused_and_leaves_nothing) {
   BOOST_CHECK_THROW(write_certified_picture(at("no-folder/never.png"), slice), Error);
   for (const char* name : {"never.npy", "never.certificate.json", "never.bound.png", "no-folder"})
     BOOST_TEST(!fs::exists(at(name)));
+}
+
+BOOST_AUTO_TEST_CASE(a_part_that_is_not_covered_cannot_be_asked_for) {
+  PictureRequest request = request_of(RenderMode::dvr);
+  request.options.shading = false;
+  const CertifiedPicture usual = certify_picture(device(), file(), request);
+  request.covered = CoveredCylinder{1e6, {-1e6, 1e6}};
+  const CertifiedPicture asked = certify_picture(device(), file(), request);
+  BOOST_TEST(asked.record.covered.radius == usual.record.covered.radius);
+  BOOST_TEST(asked.record.pixels_sha256 == usual.record.pixels_sha256);
 }
 
 BOOST_AUTO_TEST_CASE(a_certificate_that_was_changed_does_not_hold) {
@@ -154,6 +179,9 @@ BOOST_AUTO_TEST_CASE(a_certificate_that_was_changed_does_not_hold) {
   BOOST_TEST(v.failures.size() == 1u);
   BOOST_TEST(!v.rays.has_value());
   VdvrFile other = file();
+  other.altered = "its seal is broken";
+  BOOST_CHECK_THROW(static_cast<void>(verify_picture(device(), other, json)), MismatchError);
+  other = file();
   other.certificate.content_sha256 = std::string(64, '0');
   BOOST_CHECK_THROW(static_cast<void>(verify_picture(device(), other, json)), MismatchError);
 }

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "host/picture/pixel/picture_json.hpp"
+#include "host/picture/render/check_render_options.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/hash.hpp"
 #include "vdvr/expert/output_file.hpp"
@@ -28,9 +29,18 @@ bool is_by_ray(RenderMode mode) {
   return mode == RenderMode::iso || mode == RenderMode::mip || mode == RenderMode::integral;
 }
 
+/// Numbers that somebody changed, or that do not follow from each other, promise nothing.
+void check_file(const VdvrFile& file) {
+  if (!file.altered.empty()) throw MismatchError("nothing is certain of an altered volume: " + file.altered);
+  if (file.certificate.comparison) return;  // check_certificate() says it better
+  if (const std::string wrong = contradiction(file.certificate); !wrong.empty())
+    throw MismatchError("the certificate contradicts itself: " + wrong);
+}
+
 void check_certificate(const Certificate& c, const PictureRequest& request) {
   const RenderOptions& o = request.options;
-  if (o.mode == RenderMode::error || o.output != RenderOutput::colour)
+  const bool known = o.mode == RenderMode::dvr || o.mode == RenderMode::slice || is_by_ray(o.mode);
+  if (!known || o.output != RenderOutput::colour)
     throw InputError("pictures of `mode` dvr, iso, mip, integral and slice are certified, of their colours");
   if (o.mode == RenderMode::iso && o.surfaces.size() != 1)
     throw InputError(fmt::format("one surface at a time is certified, not {}", o.surfaces.size()));
@@ -54,12 +64,20 @@ void check_certificate(const Certificate& c, const PictureRequest& request) {
 }
 
 Clip covered_part(const Certificate& here, const PictureRequest& request) {
-  const auto covered = request.covered ? request.covered : here.covered;
+  const auto covered = here.covered ? here.covered : request.covered;
   if (!covered)
     throw InputError(
         "the volume does not say where it is covered, since an earlier version wrote it; name its scan by "
         "`covered_from`, or build it again");
   return certified_part(*covered, here);
+}
+
+/// A part of what is covered is a box of it, or the covered cylinder itself.
+void check_part(const RenderOptions& o) {
+  check_options(o);
+  if (o.clip && (o.clip->axis[0] != 0 || o.clip->axis[1] != 0))
+    throw InputError(
+        "`clip`: a certified picture is of a box within the covered region, about no other axis");
 }
 
 /// Of what is drawn, what lies where F's differences are known.
@@ -264,6 +282,7 @@ CertifiedPicture certify_picture(DrawnVolume& volume, const Certificate& here, c
   record.lit = request.lit && record.options.mode == RenderMode::dvr && record.options.shading;
   record.covered = {covered.radius, {covered.low[2], covered.high[2]}};
   if (record.options.mode != RenderMode::slice) {
+    check_part(request.options);
     record.options.clip = covered;
     cut_to(*record.options.clip, request.options.clip.value_or(Clip{}));
   }
@@ -292,6 +311,7 @@ CertifiedPicture certify_picture(DrawnVolume& volume, const Certificate& here, c
 
 CertifiedPicture certify_picture(Device& device, const VdvrFile& file, const PictureRequest& request,
                                  const Progress& progress) {
+  check_file(file);
   DrawnVolume volume({&device}, file.volume, progress);
   PictureRequest safe = request;
   if (volume.by_bricks()) safe.options.sampler = volume.sampler(request.options.sampler);

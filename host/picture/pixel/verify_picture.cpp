@@ -176,6 +176,7 @@ void compare_region(const PictureRecord& record, const Certificate& certificate,
 PictureVerification verify_picture(Device& device, const VdvrFile& file,
                                    const std::filesystem::path& certificate,
                                    const VerifyPictureOptions& options, const Progress& progress) {
+  if (!file.altered.empty()) throw MismatchError("nothing is certain of an altered volume: " + file.altered);
   const auto [record, claims] = read_picture_certificate(certificate);
   if (file.certificate.content_sha256 != record.content_sha256)
     throw MismatchError(fmt::format("{}: is of the volume with content {}, this one has {}",

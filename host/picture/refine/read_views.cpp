@@ -82,11 +82,10 @@ WantedViews read_views(const std::filesystem::path& path) {
     if (range.size() != 2 || !(range[0] < range[1])) file.fail("'tf_range' is no [low, high]");
     out.transfer_range = {range[0], range[1]};
   }
-  for (const io::Description& view : file.members(
-           "views", {"azimuth", "elevation", "zoom", "position", "focal_point", "view_up", "view_angle"}))
+  const std::set<std::string> known{"azimuth",     "elevation", "zoom",      "position",
+                                    "focal_point", "view_up",   "view_angle"};
+  for (const io::Description& view : file.members("views", known, most_views))
     out.views.push_back(view_of(view));
-  if (out.views.size() > most_views)
-    file.fail(fmt::format("'views' has {} views; at most {} are read", out.views.size(), most_views));
   if (!file.has("tf")) return out;
   out.transfer = file.text("tf");
   if (out.transfer.empty()) file.fail("'tf' is no name of a preset or a file");

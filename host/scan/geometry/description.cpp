@@ -17,6 +17,19 @@ namespace vdvr::io {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
+namespace {
+
+/// Refuses what is nested so deeply that copying it would take the stack.
+json::parser_callback_t nested() {
+  return [](int depth, json::parse_event_t, json&) {
+    constexpr int most = 64;
+    if (depth > most) throw InputError(fmt::format("is nested more than {} deep", most));
+    return true;
+  };
+}
+
+}  // namespace
+
 Description::Description(fs::path file, const std::set<std::string>& known) : file_(std::move(file)) {
   // The description of a scan takes lines, not megabytes: a larger file is something else.
   constexpr std::uintmax_t largest = 16u << 20;
@@ -26,9 +39,11 @@ Description::Description(fs::path file, const std::set<std::string>& known) : fi
                                          : "cannot be opened");
   const std::string text = read_text(file_, "a description", largest);
   try {
-    json_ = json::parse(text, nullptr, true, true);
+    json_ = json::parse(text, nested(), true, true);
   } catch (const json::exception& e) {
     fail(fmt::format("is not JSON: {}", e.what()));
+  } catch (const InputError& e) {
+    fail(e.what());
   }
   if (!json_.is_object()) fail("is not a JSON object");
   require_known(known);
@@ -44,10 +59,12 @@ Description Description::member(const std::string& key, const std::set<std::stri
   return {file_, within_ + key + ".", json_.at(key), known};
 }
 
-std::vector<Description> Description::members(const std::string& key,
-                                              const std::set<std::string>& known) const {
+std::vector<Description> Description::members(const std::string& key, const std::set<std::string>& known,
+                                              std::size_t most) const {
   if (!has(key) || !is_list(key) || json_.at(key).empty())
     fail(fmt::format("{} must be a list of at least one object", quoted(key)));
+  if (json_.at(key).size() > most)
+    fail(fmt::format("{} has {} members; at most {} are read", quoted(key), json_.at(key).size(), most));
   std::vector<Description> all;
   for (const json& item : json_.at(key)) {
     const std::string name = fmt::format("{}[{}]", key, all.size());

@@ -21,9 +21,9 @@ class Description {
   /// The object that is member `key`.
   [[nodiscard]] Description member(const std::string& key, const std::set<std::string>& known) const;
 
-  /// The objects that the list `key` holds, at least one.
-  [[nodiscard]] std::vector<Description> members(const std::string& key,
-                                                 const std::set<std::string>& known) const;
+  /// The objects that the list `key` holds, at least one and no more than `most`.
+  [[nodiscard]] std::vector<Description> members(const std::string& key, const std::set<std::string>& known,
+                                                 std::size_t most = 100'000) const;
 
   [[noreturn]] void fail(const std::string& what) const;
   [[nodiscard]] bool has(const std::string& key) const { return json_.contains(key); }

@@ -197,13 +197,19 @@ class RtkReader {
     if (!std::filesystem::is_regular_file(path_, error))
       throw FileError(path_.string() + ": no such file, or not readable");
     text_ = read_text(path_, "a geometry file", largest_file);
+    // RTK writes neither, and a number would end at the first.
+    for (const std::string_view odd : {std::string_view("\0", 1), std::string_view("&#")})
+      if (const auto at = text_.find(odd); at != std::string::npos)
+        fail_at(static_cast<std::ptrdiff_t>(at), "holds a character that is no part of a geometry");
     if (std::count(text_.begin(), text_.end(), '<') > most_tags)
       throw FileError(fmt::format("{}: more than {} tags", path_.string(), most_tags));
-    const auto parsed =
-        document_.load_buffer(text_.data(), text_.size(), pugi::parse_default, pugi::encoding_utf8);
+    const auto parsed = document_.load_buffer(
+        text_.data(), text_.size(), pugi::parse_default | pugi::parse_fragment, pugi::encoding_utf8);
     if (!parsed) fail_at(parsed.offset, fmt::format("{}: not XML, or truncated", parsed.description()));
     const pugi::xml_node root = document_.document_element();
-    if (const auto next = root.next_sibling()) fail(next, "something follows the root element");
+    if (!root) throw FileError(path_.string() + ": not XML, or truncated");
+    for (const pugi::xml_node& beside : document_.children())
+      if (beside != root) fail(beside, "something stands beside the root element");
     return root;
   }
   static std::string name_of(const pugi::xml_node& node) { return node.name(); }
