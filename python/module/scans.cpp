@@ -22,6 +22,7 @@
 #include "vdvr/expert/certify.hpp"
 #include "vdvr/device.hpp"
 #include "vdvr/expert/find_center.hpp"
+#include "vdvr/expert/preparation.hpp"
 #include "vdvr/read_scan.hpp"
 #include "vdvr/expert/reconstruct.hpp"
 #include "vdvr/expert/scan_of_array.hpp"

@@ -208,8 +208,8 @@ class RtkReader {
     if (!parsed) fail_at(parsed.offset, fmt::format("{}: not XML, or truncated", parsed.description()));
     const pugi::xml_node root = document_.document_element();
     if (!root) throw FileError(path_.string() + ": not XML, or truncated");
-    for (const pugi::xml_node& beside : document_.children())
-      if (beside != root) fail(beside, "something stands beside the root element");
+    if (const auto next = root.next_sibling()) fail(next, "something follows the root element");
+    if (const auto before = root.previous_sibling()) fail(before, "something stands before the root element");
     return root;
   }
   static std::string name_of(const pugi::xml_node& node) { return node.name(); }
