@@ -8,9 +8,9 @@
 #include <numbers>
 
 #include "bench/hand_loop.hpp"
+#include "host/base/opencl/kernel.hpp"
 #include "host/field/fbp/back_project.hpp"
 #include "host/field/fbp/reconstruct.hpp"
-#include "host/base/opencl/kernel.hpp"
 #include "vdvr/device.hpp"
 
 using namespace vdvr;

@@ -9,9 +9,9 @@
 #include "apps/common/arguments.hpp"
 #include "apps/common/messages.hpp"
 #include "apps/common/progress.hpp"
-#include "vdvr/expert/trust.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/stop.hpp"
+#include "vdvr/expert/trust.hpp"
 
 namespace vdvr::cli {
 namespace {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "apps/common/common_options.hpp"
-#include "apps/vdvr/options.hpp"
 #include "apps/vdvr/inputs.hpp"
+#include "apps/vdvr/options.hpp"
 #include "vdvr/certify_scan.hpp"
 #include "vdvr/expert/certify.hpp"
 #include "vdvr/expert/noise_forecast.hpp"

@@ -4,8 +4,8 @@
 
 #include "apps/vdvr/inputs.hpp"
 #include "vdvr/certified_picture.hpp"
-#include "vdvr/expert/certified_region.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/certified_region.hpp"
 
 namespace vdvr::cli {
 namespace {

@@ -8,8 +8,8 @@
 #include <numeric>
 
 #include "apps/common/progress.hpp"
-#include "vdvr/expert/trust.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/trust.hpp"
 
 namespace vdvr::cli {
 namespace {

@@ -5,12 +5,12 @@
 #include "apps/common/messages.hpp"
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/crew.hpp"
-#include "vdvr/expert/certify.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/read_scan.hpp"
+#include "vdvr/expert/certify.hpp"
 #include "vdvr/expert/reconstruct.hpp"
-#include "vdvr/verify_file.hpp"
 #include "vdvr/expert/volume_file.hpp"
+#include "vdvr/read_scan.hpp"
+#include "vdvr/verify_file.hpp"
 
 namespace fs = std::filesystem;
 

@@ -12,8 +12,8 @@
 #include "vdvr/expert/noise.hpp"
 #include "vdvr/expert/progress.hpp"
 #include "vdvr/expert/projections.hpp"
-#include "vdvr/read_scan.hpp"
 #include "vdvr/expert/understood.hpp"
+#include "vdvr/read_scan.hpp"
 #include "vdvr/vdvr_file.hpp"
 
 namespace vdvr::cli {

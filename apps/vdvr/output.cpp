@@ -10,8 +10,8 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/common/messages.hpp"
-#include "vdvr/expert/certify.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/certify.hpp"
 #include "vdvr/expert/preparation.hpp"
 
 namespace fs = std::filesystem;

@@ -5,8 +5,8 @@
 #include <algorithm>
 
 #include "vdvr/automatic_view.hpp"
-#include "vdvr/expert/decorate.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/decorate.hpp"
 #include "vdvr/expert/error_slice.hpp"
 
 namespace vdvr::cli {

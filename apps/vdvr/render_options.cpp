@@ -5,9 +5,9 @@
 #include "apps/vdvr/certify_options.hpp"
 #include "apps/vdvr/clip.hpp"
 #include "apps/vdvr/crew.hpp"
+#include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/options.hpp"
 #include "apps/vdvr/overlay.hpp"
-#include "apps/vdvr/inputs.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::cli {

@@ -7,8 +7,8 @@
 
 #include "apps/vdvr/crew.hpp"
 #include "apps/vdvr/inputs.hpp"
-#include "vdvr/expert/certify.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/certify.hpp"
 #include "vdvr/expert/trust.hpp"
 
 namespace vdvr::cli {

@@ -8,25 +8,25 @@
 #include <cmath>
 #include <utility>
 
+#include "host/base/opencl/host_memory.hpp"
+#include "host/base/system/casts.hpp"
 #include "host/certify/brick_refinement.hpp"
 #include "host/certify/build_journal.hpp"
 #include "host/certify/choose_coarsening.hpp"
 #include "host/certify/closing/close_boundaries.hpp"
-#include "host/certify/fill_certificate.hpp"
-#include "host/certify/plan_units.hpp"
-#include "host/certify/sampler_share.hpp"
 #include "host/certify/closing/raise_levels.hpp"
 #include "host/certify/crew/crew.hpp"
-#include "host/field/fbp/reconstruct.hpp"
+#include "host/certify/fill_certificate.hpp"
 #include "host/certify/gold/gold_batch.hpp"
 #include "host/certify/gold/prepared_scan.hpp"
-#include "host/base/opencl/host_memory.hpp"
-#include "host/base/system/casts.hpp"
+#include "host/certify/plan_units.hpp"
+#include "host/certify/sampler_share.hpp"
+#include "host/field/fbp/reconstruct.hpp"
 #include "host/volume/bricks.hpp"
 #include "host/volume/result_units.hpp"
-#include "vdvr/expert/trust.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/region_of_interest.hpp"
+#include "vdvr/expert/trust.hpp"
 
 namespace vdvr {
 namespace {

@@ -11,10 +11,10 @@
 #include "host/certify/build_journal.hpp"
 #include "host/certify/gold/gold_settings.hpp"
 #include "host/field/fdk/filter_cone.hpp"
-#include "host/volume/covered_range.hpp"
-#include "vdvr/expert/certified_region.hpp"
 #include "host/scan/input_statement_json.hpp"
+#include "host/volume/covered_range.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/certified_region.hpp"
 #include "vdvr/expert/region_of_interest.hpp"
 #include "vdvr/vdvr_file.hpp"
 

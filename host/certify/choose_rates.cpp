@@ -10,8 +10,8 @@
 #include <limits>
 #include <optional>
 
-#include "host/certify/gold/gold_batch.hpp"
 #include "host/base/system/casts.hpp"
+#include "host/certify/gold/gold_batch.hpp"
 #include "host/volume/bricks.hpp"
 #include "vdvr/error.hpp"
 

@@ -10,10 +10,10 @@
 #include <utility>
 #include <vector>
 
+#include "host/base/opencl/host_memory.hpp"
 #include "host/certify/closing/open_bricks.hpp"
 #include "host/certify/crew/journalled_gold.hpp"
 #include "host/certify/gold/gold_batch.hpp"
-#include "host/base/opencl/host_memory.hpp"
 
 namespace vdvr {
 

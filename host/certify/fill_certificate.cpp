@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <optional>
 
-#include "host/certify/gold/worst_node.hpp"
 #include "host/base/system/casts.hpp"
+#include "host/certify/gold/worst_node.hpp"
 #include "host/volume/bricks.hpp"
 #include "host/volume/covered_range.hpp"
 #include "vdvr/expert/certified_region.hpp"

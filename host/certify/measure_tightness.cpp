@@ -6,12 +6,12 @@
 #include <numeric>
 #include <random>
 
-#include "host/field/fbp/reconstruct.hpp"
+#include "host/base/system/casts.hpp"
 #include "host/certify/gold/base_of_gold.hpp"
 #include "host/certify/gold/gold_batch.hpp"
 #include "host/certify/gold/prepared_scan.hpp"
+#include "host/field/fbp/reconstruct.hpp"
 #include "host/scan/units.hpp"
-#include "host/base/system/casts.hpp"
 #include "host/volume/bricks.hpp"
 
 namespace vdvr {

@@ -9,12 +9,12 @@
 #include <limits>
 #include <utility>
 
+#include "host/base/system/casts.hpp"
 #include "host/certify/foresee.hpp"
 #include "host/certify/gold/gold_settings.hpp"
-#include "host/base/system/casts.hpp"
 #include "host/volume/bricks.hpp"
-#include "vdvr/expert/certified_region.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/certified_region.hpp"
 
 namespace vdvr {
 namespace {

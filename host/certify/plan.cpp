@@ -12,22 +12,22 @@
 #include <numbers>
 #include <utility>
 
+#include "host/base/opencl/host_memory.hpp"
+#include "host/base/system/casts.hpp"
 #include "host/certify/bounds/amplitude_bounds.hpp"
 #include "host/certify/bounds/paper_bounds.hpp"
-#include "host/volume/covered_range.hpp"
 #include "host/certify/choose_coarsening.hpp"
 #include "host/certify/choose_rates.hpp"
 #include "host/certify/foresee.hpp"
 #include "host/certify/gold/base_of_gold.hpp"
+#include "host/certify/gold/gold_batch.hpp"
 #include "host/certify/gold/prepared_scan.hpp"
 #include "host/certify/plan_units.hpp"
 #include "host/field/fbp/reconstruct.hpp"
-#include "host/certify/gold/gold_batch.hpp"
-#include "host/base/opencl/host_memory.hpp"
-#include "host/volume/sampler/sampler_terms.hpp"
 #include "host/scan/row_window.hpp"
-#include "host/base/system/casts.hpp"
 #include "host/volume/bricks.hpp"
+#include "host/volume/covered_range.hpp"
+#include "host/volume/sampler/sampler_terms.hpp"
 #include "host/volume/validate_volume.hpp"
 #include "vdvr/error.hpp"
 

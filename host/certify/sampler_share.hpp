@@ -9,10 +9,10 @@
 #include "host/certify/crew/crew.hpp"
 #include "host/certify/gold/gold_batch.hpp"
 #include "host/certify/gold/node_tolerance.hpp"
-#include "host/volume/sampler/sampler_terms.hpp"
 #include "host/scan/units.hpp"
-#include "vdvr/expert/certificate.hpp"
+#include "host/volume/sampler/sampler_terms.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/certificate.hpp"
 #include "vdvr/expert/plan.hpp"
 
 namespace vdvr {

@@ -13,15 +13,15 @@
 #include <numeric>
 #include <tuple>
 
-#include "host/export/hdf5_sink.hpp"
-#include "host/export/ome_zarr.hpp"
-#include "host/volume/sampler/sample_box.hpp"
-#include "host/export/tiff_sink.hpp"
-#include "host/export/volume_sink.hpp"
 #include "host/base/system/casts.hpp"
 #include "host/base/system/limits.hpp"
-#include "host/base/system/parallel.hpp"
 #include "host/base/system/lower.hpp"
+#include "host/base/system/parallel.hpp"
+#include "host/export/hdf5_sink.hpp"
+#include "host/export/ome_zarr.hpp"
+#include "host/export/tiff_sink.hpp"
+#include "host/export/volume_sink.hpp"
+#include "host/volume/sampler/sample_box.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/export_vtk.hpp"
 

@@ -12,12 +12,12 @@
 #include <numeric>
 #include <vector>
 
-#include "host/export/export_note.hpp"
-#include "host/export/pack.hpp"
-#include "host/volume/sampler/sample_box.hpp"
-#include "host/export/vtk_partition.hpp"
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/export/export_note.hpp"
+#include "host/export/pack.hpp"
+#include "host/export/vtk_partition.hpp"
+#include "host/volume/sampler/sample_box.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/output_file.hpp"
 

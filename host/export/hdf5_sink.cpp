@@ -5,11 +5,11 @@
 #include <optional>
 #include <vector>
 
-#include "host/export/pack.hpp"
-#include "host/files/hdf5/hdf5_writer.hpp"
 #include "host/base/system/length_unit.hpp"
 #include "host/base/system/limits.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/export/pack.hpp"
+#include "host/files/hdf5/hdf5_writer.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/output_file.hpp"
 

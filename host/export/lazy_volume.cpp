@@ -13,12 +13,12 @@
 #include <utility>
 #include <vector>
 
-#include "host/volume/sampler/sample_box.hpp"
-#include "host/files/hdf5/hdf5_chunks.hpp"
 #include "host/base/system/casts.hpp"
+#include "host/files/hdf5/hdf5_chunks.hpp"
 #include "host/volume/bricks.hpp"
-#include "host/volume/vdvr_file.hpp"
+#include "host/volume/sampler/sample_box.hpp"
 #include "host/volume/validate_volume.hpp"
+#include "host/volume/vdvr_file.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

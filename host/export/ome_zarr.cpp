@@ -12,11 +12,11 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "host/export/pack.hpp"
-#include "host/volume/sampler/sample_box.hpp"
 #include "host/base/system/casts.hpp"
 #include "host/base/system/limits.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/export/pack.hpp"
+#include "host/volume/sampler/sample_box.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/output_file.hpp"
 

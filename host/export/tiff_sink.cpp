@@ -9,9 +9,9 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "host/files/io/tiff_messages.hpp"
 #include "host/base/system/limits.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/files/io/tiff_messages.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/output_file.hpp"
 

@@ -11,8 +11,8 @@
 #include <memory>
 #include <string>
 
-#include "host/picture/palette.hpp"
 #include "host/base/system/png.hpp"
+#include "host/picture/palette.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/output_file.hpp"
 

@@ -10,9 +10,9 @@
 #include <optional>
 
 #include "host/picture/canvas.hpp"
+#include "host/picture/render/glm_vectors.hpp"
 #include "host/picture/text.hpp"
 #include "host/picture/ticks.hpp"
-#include "host/picture/render/glm_vectors.hpp"
 
 namespace vdvr {
 namespace {

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "host/scan/raw/raw_scan.hpp"
 #include "host/scan/preprocess.hpp"
+#include "host/scan/raw/raw_scan.hpp"
 #include "host/scan/values.hpp"
 #include "vdvr/read_scan.hpp"
 

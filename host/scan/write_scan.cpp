@@ -10,9 +10,9 @@
 #include <random>
 #include <span>
 
-#include "host/files/hdf5/hdf5_writer.hpp"
 #include "host/base/system/casts.hpp"
 #include "host/base/system/limits.hpp"
+#include "host/files/hdf5/hdf5_writer.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/output_file.hpp"
 #include "vdvr/read_scan.hpp"

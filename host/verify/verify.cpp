@@ -11,23 +11,23 @@
 #include <random>
 #include <utility>
 
+#include "host/base/opencl/host_memory.hpp"
+#include "host/base/system/casts.hpp"
+#include "host/scan/units.hpp"
 #include "host/verify/claims/verify_scope.hpp"
 #include "host/verify/claims/verify_terms.hpp"
-#include "host/base/opencl/host_memory.hpp"
-#include "host/volume/sampler/sampler_terms.hpp"
-#include "host/scan/units.hpp"
-#include "host/base/system/casts.hpp"
 #include "host/verify/seams.hpp"
 #include "host/verify/verify_attack.hpp"
 #include "host/verify/verify_field.hpp"
 #include "host/verify/verify_points.hpp"
 #include "host/volume/bricks.hpp"
-#include "vdvr/expert/certified_region.hpp"
-#include "vdvr/expert/trust.hpp"
+#include "host/volume/sampler/sampler_terms.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/certified_region.hpp"
 #include "vdvr/expert/exact_field.hpp"
 #include "vdvr/expert/reconstruct.hpp"
 #include "vdvr/expert/region_of_interest.hpp"
+#include "vdvr/expert/trust.hpp"
 
 namespace vdvr {
 namespace {

@@ -13,11 +13,11 @@
 #include <utility>
 #include <vector>
 
-#include "host/field/fbp/coverage.hpp"
 #include "host/base/opencl/array.hpp"
-#include "host/volume/sampler/device_field.hpp"
+#include "host/field/fbp/coverage.hpp"
 #include "host/verify/witness/verify_cone_bounds.hpp"
 #include "host/verify/witness/verify_nodes.hpp"
+#include "host/volume/sampler/device_field.hpp"
 #include "vdvr/expert/exact_field.hpp"
 #include "vdvr/expert/mixed_volume.hpp"
 

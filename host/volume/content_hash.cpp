@@ -5,9 +5,9 @@
 #include <span>
 
 #include "host/base/system/scratch_pass.hpp"
+#include "host/volume/validate_volume.hpp"
 #include "host/volume/vdvr_file.hpp"
 #include "host/volume/vdvr_layout.hpp"
-#include "host/volume/validate_volume.hpp"
 #include "vdvr/expert/hash.hpp"
 
 namespace vdvr {

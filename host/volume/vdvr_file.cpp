@@ -13,12 +13,12 @@
 #include <optional>
 #include <span>
 
-#include "host/files/hdf5/hdf5_reader.hpp"
 #include "host/base/system/limits.hpp"
 #include "host/base/system/read_in_child.hpp"
+#include "host/files/hdf5/hdf5_reader.hpp"
 #include "host/volume/seal.hpp"
-#include "host/volume/vdvr_layout.hpp"
 #include "host/volume/validate_volume.hpp"
+#include "host/volume/vdvr_layout.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/hash.hpp"
 

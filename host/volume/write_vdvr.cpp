@@ -5,9 +5,9 @@
 
 #include "host/files/hdf5/hdf5_writer.hpp"
 #include "host/volume/seal.hpp"
+#include "host/volume/validate_volume.hpp"
 #include "host/volume/vdvr_file.hpp"
 #include "host/volume/vdvr_layout.hpp"
-#include "host/volume/validate_volume.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/output_file.hpp"
 

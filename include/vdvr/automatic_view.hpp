@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "vdvr/expert/certificate.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/expert/certificate.hpp"
 #include "vdvr/expert/mixed_volume.hpp"
 #include "vdvr/raycast.hpp"
 

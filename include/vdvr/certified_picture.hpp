@@ -10,12 +10,12 @@
 #include <utility>
 #include <vector>
 
+#include "vdvr/api.hpp"
+#include "vdvr/device.hpp"
 #include "vdvr/expert/certificate.hpp"
 #include "vdvr/expert/certified_rays.hpp"
 #include "vdvr/expert/certify_picture.hpp"
-#include "vdvr/device.hpp"
 #include "vdvr/expert/drawn_volume.hpp"
-#include "vdvr/api.hpp"
 #include "vdvr/expert/progress.hpp"
 #include "vdvr/expert/projections.hpp"
 #include "vdvr/raycast.hpp"

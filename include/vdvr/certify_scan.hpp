@@ -7,8 +7,8 @@
 #include <optional>
 #include <string>
 
-#include "vdvr/expert/certify.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/expert/certify.hpp"
 #include "vdvr/expert/noise_forecast.hpp"
 #include "vdvr/expert/picture_refinement.hpp"
 

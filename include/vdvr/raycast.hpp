@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "vdvr/expert/camera.hpp"
-#include "vdvr/device.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/device.hpp"
+#include "vdvr/expert/camera.hpp"
 #include "vdvr/expert/image.hpp"
 #include "vdvr/expert/probe_sampler.hpp"
 #include "vdvr/expert/resident_volume.hpp"

@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <string>
 
-#include "vdvr/expert/certificate.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/expert/certificate.hpp"
 #include "vdvr/expert/mixed_volume.hpp"
 
 namespace vdvr {

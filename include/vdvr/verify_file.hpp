@@ -6,8 +6,8 @@
 #include <string>
 
 #include "vdvr/api.hpp"
-#include "vdvr/vdvr_file.hpp"
 #include "vdvr/expert/verify.hpp"
+#include "vdvr/vdvr_file.hpp"
 
 namespace vdvr {
 

@@ -9,12 +9,12 @@
 
 #include "vdvr/automatic_view.hpp"
 #include "vdvr/certified_picture.hpp"
-#include "vdvr/expert/certified_points.hpp"
 #include "vdvr/device.hpp"
+#include "vdvr/expert/certified_points.hpp"
 #include "vdvr/expert/drawn_volume.hpp"
 #include "vdvr/expert/error_slice.hpp"
-#include "vdvr/raycast.hpp"
 #include "vdvr/expert/safe_sampler.hpp"
+#include "vdvr/raycast.hpp"
 #include "vdvr/vdvr_file.hpp"
 
 namespace vdvr::python {

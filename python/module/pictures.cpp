@@ -13,8 +13,8 @@
 #include "vdvr/expert/error_slice.hpp"
 #include "vdvr/expert/framing.hpp"
 #include "vdvr/expert/image.hpp"
-#include "vdvr/raycast.hpp"
 #include "vdvr/expert/transfer_function.hpp"
+#include "vdvr/raycast.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;

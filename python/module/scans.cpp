@@ -19,14 +19,14 @@
 #include "asked.hpp"
 #include "long_work.hpp"
 #include "parts.hpp"
-#include "vdvr/expert/certify.hpp"
 #include "vdvr/device.hpp"
+#include "vdvr/expert/certify.hpp"
 #include "vdvr/expert/find_center.hpp"
 #include "vdvr/expert/preparation.hpp"
-#include "vdvr/read_scan.hpp"
 #include "vdvr/expert/reconstruct.hpp"
 #include "vdvr/expert/scan_of_array.hpp"
 #include "vdvr/expert/scratch.hpp"
+#include "vdvr/read_scan.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;

@@ -10,8 +10,8 @@
 #include "tests/support/mixed_volumes.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/expert/mixed_volume.hpp"
-#include "vdvr/raycast.hpp"
 #include "vdvr/expert/verify.hpp"
+#include "vdvr/raycast.hpp"
 
 // Attacks on what comes after gold: the sampler's term, the rim of the covered region, and stored fields
 // measured end to end. Without slack.

@@ -6,8 +6,8 @@
 #include <numbers>
 #include <random>
 
-#include "host/certify/kept/kept_gold.hpp"
 #include "host/base/system/casts.hpp"
+#include "host/certify/kept/kept_gold.hpp"
 #include "tests/reference/field_derivatives.hpp"
 #include "tests/support/attack_chain.hpp"
 #include "tests/support/attack_scans.hpp"

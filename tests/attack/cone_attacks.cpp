@@ -11,8 +11,8 @@
 #include "tests/support/cone_attacks.hpp"
 #include "tests/support/scan_chain.hpp"
 #include "tests/support/seed_arguments.hpp"
-#include "vdvr/expert/certified_region.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/certified_region.hpp"
 
 using namespace vdvr;
 using namespace vdvr::attacks;

@@ -11,10 +11,10 @@
 #include <string>
 
 #include "host/base/system/parallel.hpp"
-#include "tests/support/lit_pictures.hpp"
 #include "tests/support/levels.hpp"
-#include "vdvr/expert/certify_picture.hpp"
+#include "tests/support/lit_pictures.hpp"
 #include "vdvr/device.hpp"
+#include "vdvr/expert/certify_picture.hpp"
 
 using namespace vdvr;
 

@@ -11,8 +11,8 @@
 #include "tests/support/device.hpp"
 #include "tests/support/lit_pictures.hpp"
 #include "tests/support/pixel_attack.hpp"
-#include "vdvr/expert/certify_picture.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/certify_picture.hpp"
 
 using namespace vdvr;
 using support::device;

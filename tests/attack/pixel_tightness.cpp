@@ -13,8 +13,8 @@
 #include "host/base/system/parallel.hpp"
 #include "tests/support/analytic_pictures.hpp"
 #include "tests/support/levels.hpp"
-#include "vdvr/expert/certify_picture.hpp"
 #include "vdvr/device.hpp"
+#include "vdvr/expert/certify_picture.hpp"
 
 using namespace vdvr;
 

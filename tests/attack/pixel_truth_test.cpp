@@ -6,8 +6,8 @@
 
 #include <iostream>
 
-#include "host/picture/rays/crossings.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/picture/rays/crossings.hpp"
 #include "tests/support/analytic_pictures.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/pixel_attack.hpp"

@@ -11,8 +11,8 @@
 #include <optional>
 #include <string>
 
-#include "host/picture/rays/crossings.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/picture/rays/crossings.hpp"
 #include "tests/support/analytic_pictures.hpp"
 
 using namespace vdvr;

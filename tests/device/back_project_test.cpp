@@ -3,9 +3,9 @@
 
 #include <boost/test/unit_test.hpp>
 
+#include "host/base/opencl/kernel.hpp"
 #include "host/certify/bounds/projection_bounds.hpp"
 #include "host/certify/bounds/six_taps.hpp"
-#include "host/base/opencl/kernel.hpp"
 #include "tests/reference/back_project.hpp"
 #include "tests/reference/cosine_series.hpp"
 #include "tests/reference/ramp_filter.hpp"

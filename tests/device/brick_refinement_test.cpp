@@ -8,9 +8,9 @@
 #include <random>
 
 #include "tests/support/scans.hpp"
+#include "vdvr/error.hpp"
 #include "vdvr/expert/build.hpp"
 #include "vdvr/expert/certified_region.hpp"
-#include "vdvr/error.hpp"
 #include "vdvr/expert/exact_field.hpp"
 #include "vdvr/expert/probe_sampler.hpp"
 

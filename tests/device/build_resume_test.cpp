@@ -9,8 +9,8 @@
 
 #include "tests/support/scans.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "vdvr/expert/build.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/build.hpp"
 #include "vdvr/vdvr_file.hpp"
 
 using namespace vdvr;

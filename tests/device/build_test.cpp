@@ -14,8 +14,8 @@
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/exact_field.hpp"
-#include "vdvr/vdvr_file.hpp"
 #include "vdvr/expert/verify.hpp"
+#include "vdvr/vdvr_file.hpp"
 
 using namespace vdvr;
 using vdvr::testing::grid_of;

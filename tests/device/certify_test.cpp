@@ -7,12 +7,12 @@
 #include <functional>
 #include <string>
 
-#include "tests/support/tolerance.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "vdvr/expert/certify.hpp"
+#include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/certify.hpp"
 #include "vdvr/expert/verify.hpp"
 #include "vdvr/verify_file.hpp"
 

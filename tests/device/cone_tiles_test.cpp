@@ -9,9 +9,9 @@
 #include <random>
 #include <string>
 
-#include "host/field/fbp/back_project.hpp"
-#include "host/certify/kept/kept_gold.hpp"
 #include "host/base/system/casts.hpp"
+#include "host/certify/kept/kept_gold.hpp"
+#include "host/field/fbp/back_project.hpp"
 #include "tests/support/attack_chain.hpp"
 #include "tests/support/cone_scans.hpp"
 

@@ -4,9 +4,9 @@
 #include <boost/test/unit_test.hpp>
 #include <limits>
 
+#include "host/base/opencl/fft.hpp"
 #include "host/field/fbp/ramp_kernel.hpp"
 #include "host/field/fbp/view_weights.hpp"
-#include "host/base/opencl/fft.hpp"
 #include "tests/reference/cosine_series.hpp"
 #include "tests/reference/ramp_filter.hpp"
 #include "tests/support/scans.hpp"

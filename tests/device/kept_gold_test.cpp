@@ -8,8 +8,8 @@
 #include <random>
 #include <string>
 
-#include "host/field/fbp/back_project.hpp"
 #include "host/base/system/casts.hpp"
+#include "host/field/fbp/back_project.hpp"
 #include "tests/support/attack_chain.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/tolerance.hpp"

@@ -10,8 +10,8 @@
 #include "vdvr/expert/build.hpp"
 #include "vdvr/expert/certify_picture.hpp"
 #include "vdvr/expert/resident_volume.hpp"
-#include "vdvr/vdvr_file.hpp"
 #include "vdvr/expert/verify.hpp"
+#include "vdvr/vdvr_file.hpp"
 
 using namespace vdvr;
 using namespace vdvr::testing;

@@ -7,8 +7,8 @@
 
 #include "tests/support/paged_cases.hpp"
 #include "tests/support/rendering.hpp"
-#include "vdvr/expert/certify_picture.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/certify_picture.hpp"
 #include "vdvr/expert/paged_volume.hpp"
 #include "vdvr/expert/stop.hpp"
 

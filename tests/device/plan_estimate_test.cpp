@@ -2,8 +2,8 @@
 #include <boost/test/unit_test.hpp>
 #include <cmath>
 
-#include "vdvr/expert/certify.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/certify.hpp"
 #include "vdvr/expert/simulate.hpp"
 
 using namespace vdvr;

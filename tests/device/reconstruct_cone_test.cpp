@@ -11,8 +11,8 @@
 #include "tests/support/cone_scans.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/tolerance.hpp"
-#include "vdvr/expert/d2vr.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/d2vr.hpp"
 #include "vdvr/expert/exact_field.hpp"
 #include "vdvr/expert/simulate.hpp"
 

@@ -15,14 +15,14 @@
 #include "tests/support/photons.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "vdvr/expert/certified_points.hpp"
-#include "vdvr/error.hpp"
-#include "vdvr/expert/exact_field.hpp"
 #include "vdvr/certify_scan.hpp"
+#include "vdvr/error.hpp"
+#include "vdvr/expert/certified_points.hpp"
+#include "vdvr/expert/exact_field.hpp"
 #include "vdvr/expert/noise_forecast.hpp"
 #include "vdvr/expert/simulate.hpp"
-#include "vdvr/vdvr_file.hpp"
 #include "vdvr/expert/verify.hpp"
+#include "vdvr/vdvr_file.hpp"
 
 using namespace vdvr;
 using namespace vdvr::testing;

@@ -8,13 +8,13 @@
 #include <limits>
 #include <numbers>
 
-#include "host/volume/sampler/sampler_terms.hpp"
 #include "host/base/system/round_up.hpp"
+#include "host/volume/sampler/sampler_terms.hpp"
 #include "tests/support/attack_chain.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/tolerance.hpp"
-#include "vdvr/expert/build.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/build.hpp"
 #include "vdvr/expert/reconstruct.hpp"
 #include "vdvr/expert/verify.hpp"
 

@@ -9,13 +9,13 @@
 #include <random>
 #include <string>
 
+#include "host/base/system/casts.hpp"
 #include "host/field/fdk/filter_cone.hpp"
 #include "host/field/fdk/view_derivatives.hpp"
-#include "host/base/system/casts.hpp"
-#include "host/verify/witness/verify_cone_bounds.hpp"
 #include "host/verify/verify_field.hpp"
-#include "host/verify/witness/verify_nodes.hpp"
 #include "host/verify/verify_points.hpp"
+#include "host/verify/witness/verify_cone_bounds.hpp"
+#include "host/verify/witness/verify_nodes.hpp"
 #include "host/volume/bricks.hpp"
 #include "tests/support/cone_scans.hpp"
 #include "tests/support/device.hpp"

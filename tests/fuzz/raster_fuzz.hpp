@@ -7,8 +7,8 @@
 
 #include "tests/support/temporary_folder.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/read_scan.hpp"
 #include "vdvr/expert/volume_file.hpp"
+#include "vdvr/read_scan.hpp"
 
 namespace vdvr::fuzz {
 

@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/support/certificates.hpp"
-#include "vdvr/expert/certificate.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/certificate.hpp"
 
 using namespace vdvr;
 using nlohmann::json;

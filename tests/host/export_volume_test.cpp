@@ -10,17 +10,17 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "host/volume/sampler/sample_box.hpp"
 #include "host/files/io/npy_file.hpp"
+#include "host/volume/sampler/sample_box.hpp"
 #include "tests/support/certificates.hpp"
 #include "tests/support/mixed_volumes.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/export_volume.hpp"
 #include "vdvr/expert/export_vtk.hpp"
 #include "vdvr/expert/output_file.hpp"
 #include "vdvr/expert/stop.hpp"
 #include "vdvr/expert/volume_file.hpp"
+#include "vdvr/export_volume.hpp"
 
 namespace fs = std::filesystem;
 using namespace vdvr;

@@ -11,13 +11,13 @@
 #include <numeric>
 #include <set>
 
-#include "host/picture/palette.hpp"
 #include "host/base/system/png.hpp"
+#include "host/picture/palette.hpp"
 #include "tests/support/fields.hpp"
 #include "tests/support/temporary_folder.hpp"
+#include "vdvr/error.hpp"
 #include "vdvr/expert/animation.hpp"
 #include "vdvr/expert/decorate.hpp"
-#include "vdvr/error.hpp"
 
 using namespace vdvr;
 using support::TemporaryFolder;

@@ -11,8 +11,8 @@
 
 #include "tests/support/scans.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "vdvr/expert/build.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/build.hpp"
 #include "vdvr/raycast.hpp"
 #include "vdvr/read_scan.hpp"
 #include "vdvr/vdvr_file.hpp"

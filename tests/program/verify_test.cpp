@@ -11,15 +11,15 @@
 #include <random>
 #include <set>
 
+#include "host/verify/seams.hpp"
 #include "host/verify/verify_field.hpp"
 #include "host/verify/verify_points.hpp"
-#include "host/verify/seams.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/tolerance.hpp"
+#include "vdvr/error.hpp"
 #include "vdvr/expert/build.hpp"
 #include "vdvr/expert/certified_region.hpp"
-#include "vdvr/error.hpp"
 #include "vdvr/expert/exact_field.hpp"
 #include "vdvr/vdvr_file.hpp"
 

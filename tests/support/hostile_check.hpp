@@ -14,8 +14,8 @@
 #include "vdvr/expert/noise_forecast.hpp"
 #include "vdvr/expert/reconstruct.hpp"
 #include "vdvr/expert/region_of_interest.hpp"
-#include "vdvr/vdvr_file.hpp"
 #include "vdvr/expert/verify.hpp"
+#include "vdvr/vdvr_file.hpp"
 
 namespace vdvr::hostile {
 

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <vector>
 
-#include "host/field/fdk/filter_cone.hpp"
 #include "host/certify/gold/gold_batch.hpp"
 #include "host/certify/gold/gold_stream.hpp"
+#include "host/field/fdk/filter_cone.hpp"
 #include "vdvr/device.hpp"
 #include "vdvr/expert/exact_field.hpp"
 

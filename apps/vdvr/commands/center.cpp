@@ -8,8 +8,8 @@
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
-#include "vdvr/expert/center_sheet.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/center_sheet.hpp"
 #include "vdvr/expert/find_center.hpp"
 #include "vdvr/expert/preparation.hpp"
 

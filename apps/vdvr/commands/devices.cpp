@@ -5,8 +5,8 @@
 #include "apps/vdvr/command.hpp"
 #include "apps/vdvr/options.hpp"
 #include "apps/vdvr/output.hpp"
-#include "vdvr/expert/trust.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/trust.hpp"
 #include "vdvr/raycast.hpp"
 
 namespace vdvr::cli {

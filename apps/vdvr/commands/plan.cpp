@@ -9,9 +9,9 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/common/progress.hpp"
-#include "apps/vdvr/noise_words.hpp"
 #include "apps/vdvr/certify.hpp"
 #include "apps/vdvr/inputs.hpp"
+#include "apps/vdvr/noise_words.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/picture_forecast.hpp"
 #include "vdvr/error.hpp"

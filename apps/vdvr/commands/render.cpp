@@ -15,12 +15,12 @@
 #include "apps/vdvr/sampler_json.hpp"
 #include "apps/vdvr/source.hpp"
 #include "apps/vdvr/view.hpp"
-#include "vdvr/expert/animation.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/animation.hpp"
 #include "vdvr/expert/error_slice.hpp"
-#include "vdvr/vdvr_file.hpp"
-#include "vdvr/expert/volume_file.hpp"
 #include "vdvr/expert/trust.hpp"
+#include "vdvr/expert/volume_file.hpp"
+#include "vdvr/vdvr_file.hpp"
 
 namespace vdvr::cli {
 namespace {

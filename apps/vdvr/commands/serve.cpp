@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/common/progress.hpp"
-#include "apps/vdvr/output.hpp"
 #include "apps/vdvr/inputs.hpp"
+#include "apps/vdvr/output.hpp"
 #include "apps/vdvr/serve/server.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/live_json.hpp"

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <numbers>
 
-#include "host/certify/bounds/projection_bounds.hpp"
-#include "host/field/fbp/cosine_series.hpp"
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/certify/bounds/projection_bounds.hpp"
+#include "host/field/fbp/cosine_series.hpp"
 #include "vdvr/expert/error_map.hpp"
 
 namespace vdvr {

@@ -12,9 +12,9 @@
 #include <tuple>
 #include <vector>
 
+#include "host/base/system/parallel.hpp"
 #include "host/certify/bounds/node_functional.hpp"
 #include "host/certify/bounds/tap_design.hpp"
-#include "host/base/system/parallel.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

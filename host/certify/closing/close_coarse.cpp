@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "host/certify/closing/close_boundaries.hpp"
 #include "host/base/system/casts.hpp"
+#include "host/certify/closing/close_boundaries.hpp"
 #include "host/volume/brick_layout.hpp"
 
 namespace vdvr {

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <bit>
 
-#include "host/certify/closing/close_boundaries.hpp"
 #include "host/base/system/casts.hpp"
+#include "host/certify/closing/close_boundaries.hpp"
 #include "host/volume/brick_layout.hpp"
 
 namespace vdvr {

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "host/certify/gold/gold_batch.hpp"
 #include "host/base/system/bytes.hpp"
+#include "host/certify/gold/gold_batch.hpp"
 
 namespace vdvr {
 

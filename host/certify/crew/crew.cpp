@@ -10,9 +10,9 @@
 #include <map>
 #include <utility>
 
+#include "host/base/system/casts.hpp"
 #include "host/certify/crew/crew_messages.hpp"
 #include "host/certify/crew/crew_worker.hpp"
-#include "host/base/system/casts.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/stop.hpp"
 

@@ -15,8 +15,8 @@
 
 #include "host/certify/crew/block_pass.hpp"
 #include "host/certify/gold/prepared_scan.hpp"
-#include "vdvr/expert/crew.hpp"
 #include "vdvr/device.hpp"
+#include "vdvr/expert/crew.hpp"
 #include "vdvr/expert/probe_sampler.hpp"
 
 namespace vdvr {

@@ -9,8 +9,8 @@
 
 #include "host/certify/crew/crew_member.hpp"
 #include "host/certify/crew/crew_messages.hpp"
-#include "vdvr/expert/crew.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/crew.hpp"
 #include "vdvr/expert/stop.hpp"
 
 namespace vdvr {

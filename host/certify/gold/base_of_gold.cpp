@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "host/field/fbp/back_project.hpp"
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/field/fbp/back_project.hpp"
 
 namespace vdvr {
 namespace {

@@ -7,12 +7,12 @@
 #include <cmath>
 #include <utility>
 
-#include "host/field/fbp/reconstruct.hpp"
-#include "host/certify/gold/cell_test.hpp"
-#include "host/certify/gold/node_slack.hpp"
 #include "host/base/opencl/work_groups.hpp"
 #include "host/base/opencl/write_later.hpp"
 #include "host/base/system/casts.hpp"
+#include "host/certify/gold/cell_test.hpp"
+#include "host/certify/gold/node_slack.hpp"
+#include "host/field/fbp/reconstruct.hpp"
 #include "host/volume/bricks.hpp"
 
 namespace vdvr {

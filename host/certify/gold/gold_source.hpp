@@ -1,8 +1,8 @@
 // What streams of gold of one scan and grid share: the kept nodes and what T leaves out, brick by brick.
 #pragma once
 
-#include "host/certify/kept/brick_remainder.hpp"
 #include "host/certify/gold/gold_settings.hpp"
+#include "host/certify/kept/brick_remainder.hpp"
 #include "host/certify/kept/kept_gold.hpp"
 
 namespace vdvr {

@@ -10,12 +10,12 @@
 #include <stdexcept>
 #include <utility>
 
-#include "host/certify/gold/gold_batch.hpp"
-#include "host/field/fbp/reconstruct.hpp"
-#include "host/certify/gold/gold_blocks.hpp"
 #include "host/base/opencl/write_later.hpp"
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/certify/gold/gold_batch.hpp"
+#include "host/certify/gold/gold_blocks.hpp"
+#include "host/field/fbp/reconstruct.hpp"
 #include "host/volume/bricks.hpp"
 #include "vdvr/error.hpp"
 

@@ -16,15 +16,15 @@
 #include <string>
 #include <vector>
 
+#include "host/base/opencl/kernel.hpp"
 #include "host/certify/bounds/projection_bounds.hpp"
-#include "host/field/fbp/back_project.hpp"
-#include "host/field/fbp/coverage.hpp"
 #include "host/certify/gold/fit_coefficients.hpp"
 #include "host/certify/gold/gold_settings.hpp"
 #include "host/certify/gold/gold_source.hpp"
 #include "host/certify/gold/node_slack.hpp"
 #include "host/certify/gold/search_triples.hpp"
-#include "host/base/opencl/kernel.hpp"
+#include "host/field/fbp/back_project.hpp"
+#include "host/field/fbp/coverage.hpp"
 #include "host/volume/sampler/device_field.hpp"
 #include "shared/gold_shape.h"
 #include "shared/untested.h"

@@ -5,10 +5,10 @@
 #include <cstdint>
 #include <memory>
 
-#include "host/certify/bounds/projection_bounds.hpp"
-#include "host/field/fbp/filter_projections.hpp"
-#include "host/certify/gold/gold_source.hpp"
 #include "host/base/opencl/host_memory.hpp"
+#include "host/certify/bounds/projection_bounds.hpp"
+#include "host/certify/gold/gold_source.hpp"
+#include "host/field/fbp/filter_projections.hpp"
 #include "host/scan/units.hpp"
 
 namespace vdvr {

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "host/certify/bounds/remainder_norms.hpp"
-#include "host/field/fdk/region_parts.hpp"
 #include "host/certify/kept/kept_gold.hpp"
+#include "host/field/fdk/region_parts.hpp"
 
 namespace vdvr {
 

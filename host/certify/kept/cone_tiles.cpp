@@ -6,12 +6,12 @@
 #include <cmath>
 #include <numbers>
 
-#include "host/certify/bounds/six_taps.hpp"
-#include "host/field/fbp/back_project.hpp"
-#include "host/field/fdk/region_parts.hpp"
 #include "host/base/opencl/work_groups.hpp"
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/certify/bounds/six_taps.hpp"
+#include "host/field/fbp/back_project.hpp"
+#include "host/field/fdk/region_parts.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

@@ -13,9 +13,9 @@
 
 #include "host/certify/bounds/dense_values.hpp"
 #include "host/certify/bounds/projection_bounds.hpp"
-#include "host/field/fbp/coverage.hpp"
 #include "host/certify/kept/gold_filters.hpp"
 #include "host/certify/kept/projective_error.hpp"
+#include "host/field/fbp/coverage.hpp"
 #include "shared/cone_nodes.h"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/grid.hpp"

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "host/base/system/casts.hpp"
+#include "host/certify/kept/kept_gold.hpp"
 #include "host/field/fbp/cosine_series.hpp"
 #include "host/field/fbp/reconstruct.hpp"
-#include "host/certify/kept/kept_gold.hpp"
-#include "host/base/system/casts.hpp"
 
 namespace vdvr {
 namespace {

@@ -7,11 +7,11 @@
 #include <set>
 #include <stdexcept>
 
+#include "host/base/system/casts.hpp"
 #include "host/field/fbp/back_project.hpp"
 #include "host/field/fbp/cosine_series.hpp"
 #include "host/field/fbp/reconstruct.hpp"
 #include "host/field/fdk/region_parts.hpp"
-#include "host/base/system/casts.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

@@ -11,14 +11,14 @@
 #include <utility>
 #include <vector>
 
+#include "host/base/opencl/host_memory.hpp"
 #include "host/certify/bounds/projection_bounds.hpp"
-#include "host/field/fbp/coverage.hpp"
-#include "host/field/fbp/filter_projections.hpp"
 #include "host/certify/kept/common_gold.hpp"
 #include "host/certify/kept/cone_tiles.hpp"
 #include "host/certify/kept/gold_filters.hpp"
 #include "host/certify/kept/interpolate_gold.hpp"
-#include "host/base/opencl/host_memory.hpp"
+#include "host/field/fbp/coverage.hpp"
+#include "host/field/fbp/filter_projections.hpp"
 #include "vdvr/expert/grid.hpp"
 #include "vdvr/expert/progress.hpp"
 #include "vdvr/expert/rates.hpp"

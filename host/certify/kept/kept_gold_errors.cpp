@@ -3,8 +3,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "host/certify/kept/kept_gold.hpp"
 #include "host/base/system/casts.hpp"
+#include "host/certify/kept/kept_gold.hpp"
 
 namespace vdvr {
 namespace {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/certify/bounds/node_functional.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/certify/bounds/node_functional.hpp"
 
 namespace vdvr {
 namespace {

@@ -4,9 +4,9 @@
 #include <chrono>
 #include <cstdlib>
 
-#include "host/field/fbp/back_project.hpp"
-#include "host/certify/kept/kept_gold.hpp"
 #include "host/base/system/casts.hpp"
+#include "host/certify/kept/kept_gold.hpp"
+#include "host/field/fbp/back_project.hpp"
 
 namespace vdvr {
 

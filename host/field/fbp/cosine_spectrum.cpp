@@ -3,9 +3,9 @@
 
 #include <algorithm>
 
+#include "host/base/system/casts.hpp"
 #include "host/field/fbp/axis_product.hpp"
 #include "host/field/fbp/cosine_series.hpp"
-#include "host/base/system/casts.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

@@ -8,8 +8,8 @@
 #include <limits>
 #include <numbers>
 
-#include "host/field/fbp/view_weights.hpp"
 #include "host/base/system/casts.hpp"
+#include "host/field/fbp/view_weights.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/reconstruct.hpp"
 

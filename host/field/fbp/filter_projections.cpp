@@ -8,13 +8,13 @@
 #include <cmath>
 #include <numeric>
 
-#include "host/field/fbp/batched_product.hpp"
-#include "host/field/fbp/ramp_kernel.hpp"
-#include "host/field/fbp/view_weights.hpp"
 #include "host/base/opencl/fft.hpp"
 #include "host/base/opencl/host_memory.hpp"
 #include "host/base/system/huge_pages.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/field/fbp/batched_product.hpp"
+#include "host/field/fbp/ramp_kernel.hpp"
+#include "host/field/fbp/view_weights.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

@@ -9,11 +9,11 @@
 #include <tuple>
 #include <vector>
 
+#include "host/base/opencl/array.hpp"
+#include "host/base/opencl/column_tuning.hpp"
 #include "host/field/fbp/cosine_series.hpp"
 #include "host/field/fbp/filter_rows.hpp"
 #include "host/field/fbp/upsample_columns.hpp"
-#include "host/base/opencl/array.hpp"
-#include "host/base/opencl/column_tuning.hpp"
 #include "host/scan/units.hpp"
 #include "vdvr/expert/field_options.hpp"
 #include "vdvr/expert/progress.hpp"

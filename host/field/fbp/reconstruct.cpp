@@ -11,14 +11,14 @@
 #include <future>
 #include <optional>
 
+#include "host/base/opencl/host_memory.hpp"
+#include "host/base/opencl/kernel.hpp"
+#include "host/base/system/huge_pages.hpp"
+#include "host/base/system/parallel.hpp"
 #include "host/field/fbp/back_project.hpp"
 #include "host/field/fbp/coverage.hpp"
 #include "host/field/fbp/reconstruct.hpp"
-#include "host/base/opencl/host_memory.hpp"
-#include "host/base/opencl/kernel.hpp"
 #include "host/scan/units.hpp"
-#include "host/base/system/huge_pages.hpp"
-#include "host/base/system/parallel.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

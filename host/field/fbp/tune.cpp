@@ -8,10 +8,10 @@
 #include <cmath>
 #include <numbers>
 
+#include "host/base/opencl/kernel.hpp"
 #include "host/field/fbp/back_project.hpp"
 #include "host/field/fbp/filter_rows.hpp"
 #include "host/field/fbp/reconstruct.hpp"
-#include "host/base/opencl/kernel.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "host/field/fbp/cosine_series.hpp"
 #include "host/base/opencl/array.hpp"
+#include "host/field/fbp/cosine_series.hpp"
 #include "shared/chunks.h"
 
 namespace vdvr {

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/field/fbp/back_project.hpp"
 #include "host/base/opencl/kernel.hpp"
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/field/fbp/back_project.hpp"
 #include "shared/cone_back_project.h"
 
 namespace vdvr {

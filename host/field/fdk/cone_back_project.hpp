@@ -4,8 +4,8 @@
 #include <array>
 #include <vector>
 
-#include "host/field/fbp/filter_projections.hpp"
 #include "host/base/opencl/column_tuning.hpp"
+#include "host/field/fbp/filter_projections.hpp"
 #include "vdvr/expert/grid.hpp"
 
 namespace vdvr {

@@ -10,13 +10,13 @@
 #include <numeric>
 #include <optional>
 
-#include "host/field/fdk/cone_coverage.hpp"
+#include "host/base/system/parallel.hpp"
 #include "host/field/fbp/coverage.hpp"
-#include "host/field/fdk/fdk_weights.hpp"
-#include "host/field/fdk/filter_cone.hpp"
 #include "host/field/fbp/ramp_kernel.hpp"
 #include "host/field/fbp/view_weights.hpp"
-#include "host/base/system/parallel.hpp"
+#include "host/field/fdk/cone_coverage.hpp"
+#include "host/field/fdk/fdk_weights.hpp"
+#include "host/field/fdk/filter_cone.hpp"
 #include "vdvr/expert/reconstruct.hpp"
 
 namespace vdvr {

@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/field/fdk/fdk_weights.hpp"
-#include "host/field/fbp/ramp_kernel.hpp"
 #include "host/base/opencl/fft.hpp"
 #include "host/base/opencl/host_memory.hpp"
 #include "host/base/system/casts.hpp"
 #include "host/base/system/huge_pages.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/field/fbp/ramp_kernel.hpp"
+#include "host/field/fdk/fdk_weights.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

@@ -2,9 +2,9 @@
 #pragma once
 
 #include "host/field/fbp/coverage.hpp"
+#include "host/field/fbp/filter_projections.hpp"
 #include "host/field/fdk/cone_coverage.hpp"
 #include "host/field/fdk/fdk_weights.hpp"
-#include "host/field/fbp/filter_projections.hpp"
 #include "host/scan/units.hpp"
 
 namespace vdvr {

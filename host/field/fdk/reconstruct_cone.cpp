@@ -6,15 +6,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/base/opencl/host_memory.hpp"
+#include "host/base/system/casts.hpp"
+#include "host/base/system/parallel.hpp"
 #include "host/field/fbp/back_project.hpp"
 #include "host/field/fbp/coverage.hpp"
 #include "host/field/fbp/reconstruct.hpp"
 #include "host/field/fdk/cone_back_project.hpp"
 #include "host/field/fdk/cone_coverage.hpp"
 #include "host/field/fdk/filter_cone.hpp"
-#include "host/base/opencl/host_memory.hpp"
-#include "host/base/system/casts.hpp"
-#include "host/base/system/parallel.hpp"
 #include "shared/cone_back_project.h"
 #include "vdvr/error.hpp"
 

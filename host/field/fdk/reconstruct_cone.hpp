@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <functional>
 
+#include "host/base/opencl/state.hpp"
 #include "host/field/fbp/filter_projections.hpp"
 #include "host/field/fbp/whole_volume.hpp"
-#include "host/base/opencl/state.hpp"
 #include "host/scan/units.hpp"
 #include "vdvr/expert/reconstruct.hpp"
 

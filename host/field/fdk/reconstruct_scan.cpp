@@ -3,11 +3,11 @@
 
 #include <algorithm>
 
+#include "host/base/opencl/host_memory.hpp"
 #include "host/field/fbp/coverage.hpp"
 #include "host/field/fbp/reconstruct.hpp"
 #include "host/field/fdk/fdk_weights.hpp"
 #include "host/field/fdk/reconstruct_cone.hpp"
-#include "host/base/opencl/host_memory.hpp"
 #include "host/scan/units.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/reconstruct.hpp"

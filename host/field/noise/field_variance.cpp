@@ -16,6 +16,9 @@
 #include <limits>
 #include <numbers>
 
+#include "host/base/opencl/host_memory.hpp"
+#include "host/base/system/casts.hpp"
+#include "host/base/system/parallel.hpp"
 #include "host/field/fbp/back_project.hpp"
 #include "host/field/fbp/cosine_series.hpp"
 #include "host/field/fbp/ramp_kernel.hpp"
@@ -23,9 +26,6 @@
 #include "host/field/fbp/view_weights.hpp"
 #include "host/field/fdk/filter_cone.hpp"
 #include "host/field/fdk/reconstruct_cone.hpp"
-#include "host/base/opencl/host_memory.hpp"
-#include "host/base/system/casts.hpp"
-#include "host/base/system/parallel.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/base/system/casts.hpp"
 #include "host/field/noise/estimate_photons.hpp"
 #include "host/field/noise/field_variance.hpp"
 #include "host/field/noise/passed_noise.hpp"
-#include "host/base/system/casts.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

@@ -9,12 +9,12 @@
 #include <random>
 #include <span>
 
-#include "host/field/noise/field_variance.hpp"
-#include "host/scan/prepare/prepare.hpp"
-#include "host/scan/photon_transfer.hpp"
 #include "host/base/system/casts.hpp"
 #include "host/base/system/limits.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/field/noise/field_variance.hpp"
+#include "host/scan/photon_transfer.hpp"
+#include "host/scan/prepare/prepare.hpp"
 
 namespace vdvr {
 namespace {

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <numbers>
 
-#include "host/field/fdk/filter_cone.hpp"
-#include "host/field/noise/estimate_photons.hpp"
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/field/fdk/filter_cone.hpp"
+#include "host/field/noise/estimate_photons.hpp"
 #include "vdvr/expert/noise.hpp"
 #include "vdvr/expert/reconstruct.hpp"
 

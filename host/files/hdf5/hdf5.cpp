@@ -6,9 +6,9 @@
 
 #include <algorithm>
 
+#include "host/base/system/limits.hpp"
 #include "host/files/hdf5/hdf5_chunks.hpp"
 #include "host/files/hdf5/hdf5_filters.hpp"
-#include "host/base/system/limits.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io::hdf5 {

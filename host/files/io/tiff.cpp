@@ -14,9 +14,9 @@
 #include <optional>
 #include <sstream>
 
+#include "host/base/system/limits.hpp"
 #include "host/files/io/number_text.hpp"
 #include "host/files/io/tiff_messages.hpp"
-#include "host/base/system/limits.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {

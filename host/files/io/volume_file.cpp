@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "host/base/system/limits.hpp"
-#include "host/files/io/raster_file.hpp"
 #include "host/base/system/lower.hpp"
+#include "host/files/io/raster_file.hpp"
 #include "host/files/io/volume_samples.hpp"
 #include "host/files/io/volume_stack.hpp"
 #include "vdvr/error.hpp"

@@ -6,11 +6,11 @@
 #include <cmath>
 
 #include "host/base/system/limits.hpp"
+#include "host/base/system/lower.hpp"
 #include "host/base/system/read_in_child.hpp"
 #include "host/files/hdf5/hdf5_reader.hpp"
 #include "host/files/io/natural_order.hpp"
 #include "host/files/io/number_text.hpp"
-#include "host/base/system/lower.hpp"
 #include "host/files/io/tiff.hpp"
 #include "host/files/io/volume_samples.hpp"
 #include "vdvr/error.hpp"

@@ -11,9 +11,9 @@
 #include "vdvr/error.hpp"
 #include "vdvr/expert/error_slice.hpp"
 #include "vdvr/expert/live_events.hpp"
-#include "vdvr/raycast.hpp"
 #include "vdvr/expert/resident_volume.hpp"
 #include "vdvr/expert/safe_sampler.hpp"
+#include "vdvr/raycast.hpp"
 
 namespace vdvr {
 namespace {

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <limits>
 
-#include "vdvr/expert/certify_picture.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/certify_picture.hpp"
 
 namespace vdvr {
 namespace {

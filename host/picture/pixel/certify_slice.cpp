@@ -6,9 +6,9 @@
 
 #include "host/base/system/outward.hpp"
 #include "shared/raycast_params.h"
+#include "vdvr/error.hpp"
 #include "vdvr/expert/certified_points.hpp"
 #include "vdvr/expert/certify_picture.hpp"
-#include "vdvr/error.hpp"
 #include "vdvr/expert/stop.hpp"
 
 namespace vdvr {

@@ -2,9 +2,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "vdvr/error.hpp"
 #include "vdvr/expert/certified_rays.hpp"
 #include "vdvr/expert/certify_picture.hpp"
-#include "vdvr/error.hpp"
 
 namespace vdvr {
 

@@ -6,13 +6,13 @@
 #include <cmath>
 #include <limits>
 
+#include "host/base/system/outward.hpp"
+#include "host/base/system/parallel.hpp"
 #include "host/picture/pixel/pixel_ray.hpp"
 #include "host/picture/rays/lit_emission.hpp"
 #include "host/picture/render/check_render_options.hpp"
-#include "host/base/system/outward.hpp"
-#include "host/base/system/parallel.hpp"
-#include "vdvr/expert/certify_picture.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/certify_picture.hpp"
 
 namespace vdvr {
 namespace {

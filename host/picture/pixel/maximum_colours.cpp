@@ -3,9 +3,9 @@
 #include <cmath>
 
 #include "host/picture/pixel/pixel_ray.hpp"
-#include "vdvr/expert/certify_picture.hpp"
-#include "vdvr/expert/certified_rays.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/certified_rays.hpp"
+#include "vdvr/expert/certify_picture.hpp"
 
 namespace vdvr {
 namespace {

@@ -16,10 +16,10 @@
 #include "host/picture/render/raycast_params.hpp"
 #include "host/volume/sampler/picture_parts.hpp"
 #include "shared/certify_params.h"
-#include "vdvr/expert/certify_picture.hpp"
-#include "vdvr/expert/trust.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/certify_picture.hpp"
 #include "vdvr/expert/stop.hpp"
+#include "vdvr/expert/trust.hpp"
 
 namespace vdvr {
 namespace {

@@ -4,11 +4,11 @@
 #include <cmath>
 #include <limits>
 
+#include "host/base/system/outward.hpp"
+#include "host/base/system/parallel.hpp"
 #include "host/field/fdk/filter_cone.hpp"
 #include "host/picture/rays/crossings.hpp"
 #include "host/picture/rays/line_integral.hpp"
-#include "host/base/system/outward.hpp"
-#include "host/base/system/parallel.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/noted_scan.hpp"
 

@@ -5,14 +5,14 @@
 #include <cmath>
 #include <limits>
 
+#include "host/base/opencl/host_memory.hpp"
+#include "host/base/system/casts.hpp"
 #include "host/certify/foresee.hpp"
 #include "host/field/fdk/filter_cone.hpp"
-#include "host/base/opencl/host_memory.hpp"
-#include "host/volume/sampler/sampler_terms.hpp"
-#include "host/scan/units.hpp"
-#include "host/base/system/casts.hpp"
 #include "host/picture/refine/brick_outlook.hpp"
 #include "host/picture/refine/picture_rounds.hpp"
+#include "host/scan/units.hpp"
+#include "host/volume/sampler/sampler_terms.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/picture_refinement.hpp"
 

@@ -8,8 +8,8 @@
 
 #include "host/field/fdk/filter_cone.hpp"
 #include "host/picture/refine/picture_rounds.hpp"
-#include "vdvr/expert/certificate.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/certificate.hpp"
 
 namespace vdvr {
 namespace {

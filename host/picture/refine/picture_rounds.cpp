@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "host/picture/rays/emission.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/picture/rays/emission.hpp"
 #include "host/picture/refine/shares.hpp"
 
 namespace vdvr {

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <map>
 
-#include "host/picture/rays/emission.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/picture/rays/emission.hpp"
 
 namespace vdvr {
 namespace {

@@ -6,8 +6,8 @@
 #include <glm/geometric.hpp>
 
 #include "host/picture/render/glm_vectors.hpp"
-#include "vdvr/expert/camera.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/camera.hpp"
 
 namespace vdvr {
 namespace {

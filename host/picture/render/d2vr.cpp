@@ -8,14 +8,14 @@
 #include <cmath>
 #include <limits>
 
+#include "host/base/opencl/kernel.hpp"
+#include "host/base/system/casts.hpp"
 #include "host/field/fbp/coverage.hpp"
 #include "host/field/fbp/filter_projections.hpp"
-#include "host/base/opencl/kernel.hpp"
 #include "host/picture/render/check_render_options.hpp"
 #include "host/picture/render/raycast_params.hpp"
-#include "host/volume/sampler/resident_volume.hpp"
-#include "host/base/system/casts.hpp"
 #include "host/volume/bricks.hpp"
+#include "host/volume/sampler/resident_volume.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/reconstruct.hpp"
 

@@ -10,8 +10,8 @@
 #include <numbers>
 #include <numeric>
 
-#include "host/scan/geometry/vectors.hpp"
 #include "host/base/system/casts.hpp"
+#include "host/scan/geometry/vectors.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

@@ -141,7 +141,7 @@ opencl::Defines raycast_defines(const Impl& v, const RenderOptions& o, SamplerKi
 int group_for(int asked, int lanes) { return asked > 0 ? asked : lanes == 16 ? 16 : 8; }
 
 opencl::Range packet_range(const RenderOptions& o, const RaycastTuning& tuning, int lanes) {
-  // Pixels of one packet (shared/packet.h).
+  // Pixels of one packet (device/packet.h).
   const int packet_x = lanes == 1 ? 1 : lanes == 4 ? 2 : 4, packet_y = lanes / packet_x;
   const int group_x = group_for(tuning.group_x, lanes), group_y = group_for(tuning.group_y, lanes);
   const auto packets = [](std::int64_t pixels, int packet) {

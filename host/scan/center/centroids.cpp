@@ -8,8 +8,8 @@
 #include <array>
 #include <cmath>
 
-#include "host/scan/center/row_bands.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/scan/center/row_bands.hpp"
 
 namespace vdvr::center {
 namespace {

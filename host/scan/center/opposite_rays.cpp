@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/base/system/parallel.hpp"
 #include "host/scan/center/mirror_registration.hpp"
 #include "host/scan/center/row_bands.hpp"
-#include "host/base/system/parallel.hpp"
 
 namespace vdvr::center {
 namespace {

@@ -3,8 +3,8 @@
 
 #include <fmt/format.h>
 
-#include "host/files/io/npy_file.hpp"
 #include "host/base/system/limits.hpp"
+#include "host/files/io/npy_file.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {

@@ -3,8 +3,8 @@
 
 #include <filesystem>
 
-#include "host/scan/geometry/cone_views.hpp"
 #include "host/files/io/raster_file.hpp"
+#include "host/scan/geometry/cone_views.hpp"
 #include "vdvr/expert/rtk_geometry.hpp"
 
 namespace vdvr::io {

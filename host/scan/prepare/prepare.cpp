@@ -7,9 +7,9 @@
 #include <cmath>
 #include <thread>
 
-#include "host/scan/prepare/stripes.hpp"
 #include "host/base/system/limits.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/scan/prepare/stripes.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/preparation.hpp"
 

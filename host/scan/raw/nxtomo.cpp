@@ -6,9 +6,9 @@
 #include <array>
 #include <cmath>
 
-#include "host/scan/raw/nxtomo_beam.hpp"
 #include "host/base/system/length_unit.hpp"
 #include "host/files/io/text_encoding.hpp"
+#include "host/scan/raw/nxtomo_beam.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {

@@ -6,10 +6,10 @@
 #include <set>
 
 #include "host/files/io/raster_file.hpp"
+#include "host/files/io/text_encoding.hpp"
 #include "host/scan/raw/hdf5_scan.hpp"
 #include "host/scan/raw/raster_scan.hpp"
 #include "host/scan/raw/scan_folder.hpp"
-#include "host/files/io/text_encoding.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {

@@ -10,15 +10,15 @@
 #include <set>
 #include <tuple>
 
+#include "host/base/system/limits.hpp"
+#include "host/files/io/raster_file.hpp"
+#include "host/files/io/tiff.hpp"
 #include "host/scan/geometry/circular_geometry.hpp"
 #include "host/scan/geometry/description.hpp"
 #include "host/scan/geometry/nikon_geometry.hpp"
-#include "host/files/io/raster_file.hpp"
-#include "host/files/io/tiff.hpp"
-#include "host/scan/raw/scan_members.hpp"
 #include "host/scan/raw/hdf5_scan.hpp"
 #include "host/scan/raw/raster_scan.hpp"
-#include "host/base/system/limits.hpp"
+#include "host/scan/raw/scan_members.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {

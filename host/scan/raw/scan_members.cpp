@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "host/files/io/raster_file.hpp"
 #include "host/scan/geometry/astra_geometry.hpp"
 #include "host/scan/geometry/cil_geometry.hpp"
 #include "host/scan/geometry/circular_geometry.hpp"
@@ -11,7 +12,6 @@
 #include "host/scan/geometry/nikon_geometry.hpp"
 #include "host/scan/geometry/rtk_geometry.hpp"
 #include "host/scan/geometry/tigre_geometry.hpp"
-#include "host/files/io/raster_file.hpp"
 #include "host/scan/raw/name_angles.hpp"
 #include "host/scan/raw/raster_scan.hpp"
 #include "vdvr/error.hpp"

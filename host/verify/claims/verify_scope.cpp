@@ -9,8 +9,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "host/field/fdk/filter_cone.hpp"
 #include "host/base/system/casts.hpp"
+#include "host/field/fdk/filter_cone.hpp"
 #include "host/volume/covered_range.hpp"
 #include "vdvr/expert/region_of_interest.hpp"
 

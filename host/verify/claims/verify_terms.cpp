@@ -9,15 +9,15 @@
 #include <numbers>
 #include <utility>
 
+#include "host/base/opencl/host_memory.hpp"
+#include "host/base/system/casts.hpp"
 #include "host/certify/bounds/six_taps.hpp"
 #include "host/certify/crew/gold_rates.hpp"
-#include "host/field/fbp/reconstruct.hpp"
-#include "host/field/fdk/filter_cone.hpp"
 #include "host/certify/gold/base_of_gold.hpp"
 #include "host/certify/gold/gold_batch.hpp"
-#include "host/base/opencl/host_memory.hpp"
+#include "host/field/fbp/reconstruct.hpp"
+#include "host/field/fdk/filter_cone.hpp"
 #include "host/scan/units.hpp"
-#include "host/base/system/casts.hpp"
 #include "host/volume/covered_range.hpp"
 #include "host/volume/result_units.hpp"
 

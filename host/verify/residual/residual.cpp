@@ -7,12 +7,12 @@
 #include <cmath>
 #include <limits>
 
+#include "host/base/system/limits.hpp"
+#include "host/base/system/outward.hpp"
+#include "host/base/system/parallel.hpp"
 #include "host/verify/residual/bounds_along.hpp"
 #include "host/verify/residual/primitives.hpp"
 #include "host/verify/residual/row_integrals.hpp"
-#include "host/base/system/outward.hpp"
-#include "host/base/system/limits.hpp"
-#include "host/base/system/parallel.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include "host/verify/residual/primitives.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/verify/residual/primitives.hpp"
 #include "vdvr/expert/exact_field.hpp"
 
 namespace vdvr {

@@ -15,8 +15,8 @@
 #include "host/verify/witness/verify_cosines.hpp"
 #include "shared/verify_cone.h"
 #include "shared/verify_nodes.h"
-#include "vdvr/expert/cone_geometry.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/cone_geometry.hpp"
 
 namespace vdvr {
 

@@ -7,8 +7,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "host/field/fbp/coverage.hpp"
 #include "host/base/opencl/array.hpp"
+#include "host/field/fbp/coverage.hpp"
 #include "vdvr/expert/exact_field.hpp"
 #include "vdvr/expert/grid.hpp"
 

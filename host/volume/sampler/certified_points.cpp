@@ -7,9 +7,9 @@
 #include <cstdint>
 #include <limits>
 
-#include "host/volume/sampler/sample_box.hpp"
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/volume/sampler/sample_box.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/noted_scan.hpp"
 #include "vdvr/expert/region_of_interest.hpp"

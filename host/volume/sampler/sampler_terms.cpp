@@ -8,10 +8,10 @@
 #include <limits>
 #include <mutex>
 
-#include "host/volume/sampler/resident_volume.hpp"
 #include "host/base/system/parallel.hpp"
 #include "host/base/system/scratch_pass.hpp"
 #include "host/volume/brick_layout.hpp"
+#include "host/volume/sampler/resident_volume.hpp"
 
 namespace vdvr {
 

@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "vdvr/expert/crew.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/expert/crew.hpp"
 #include "vdvr/expert/journal.hpp"
 #include "vdvr/expert/mixed_volume.hpp"
 #include "vdvr/expert/plan.hpp"

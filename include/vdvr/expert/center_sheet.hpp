@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "vdvr/device.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/device.hpp"
 #include "vdvr/expert/field_options.hpp"
 #include "vdvr/expert/image.hpp"
 #include "vdvr/expert/progress.hpp"

@@ -7,9 +7,9 @@
 #include <span>
 #include <vector>
 
+#include "vdvr/api.hpp"
 #include "vdvr/expert/certificate.hpp"
 #include "vdvr/expert/certified_region.hpp"
-#include "vdvr/api.hpp"
 #include "vdvr/expert/grid.hpp"
 #include "vdvr/expert/mixed_volume.hpp"
 #include "vdvr/expert/progress.hpp"

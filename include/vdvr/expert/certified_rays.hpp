@@ -9,9 +9,9 @@
 #include <optional>
 #include <vector>
 
+#include "vdvr/api.hpp"
 #include "vdvr/expert/camera.hpp"
 #include "vdvr/expert/certificate.hpp"
-#include "vdvr/api.hpp"
 #include "vdvr/expert/image.hpp"
 #include "vdvr/expert/mixed_volume.hpp"
 #include "vdvr/expert/progress.hpp"

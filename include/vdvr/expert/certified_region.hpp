@@ -3,8 +3,8 @@
 
 #include <memory>
 
-#include "vdvr/expert/certificate.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/expert/certificate.hpp"
 #include "vdvr/expert/field_options.hpp"
 #include "vdvr/expert/grid.hpp"
 #include "vdvr/expert/projections.hpp"

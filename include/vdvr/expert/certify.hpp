@@ -2,9 +2,9 @@
 // input and writing its output.
 #pragma once
 
-#include "vdvr/expert/build.hpp"
-#include "vdvr/device.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/device.hpp"
+#include "vdvr/expert/build.hpp"
 #include "vdvr/expert/input_statement.hpp"
 #include "vdvr/expert/noted_scan.hpp"
 #include "vdvr/expert/plan.hpp"

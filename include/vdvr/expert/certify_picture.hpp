@@ -10,15 +10,15 @@
 #include <utility>
 #include <vector>
 
-#include "vdvr/expert/certificate.hpp"
-#include "vdvr/device.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/device.hpp"
+#include "vdvr/expert/certificate.hpp"
 #include "vdvr/expert/image.hpp"
 #include "vdvr/expert/mixed_volume.hpp"
 #include "vdvr/expert/paged_volume.hpp"
 #include "vdvr/expert/progress.hpp"
-#include "vdvr/raycast.hpp"
 #include "vdvr/expert/resident_volume.hpp"
+#include "vdvr/raycast.hpp"
 
 namespace vdvr {
 

@@ -13,9 +13,9 @@
 #include <utility>
 #include <vector>
 
-#include "vdvr/expert/common_memory.hpp"
-#include "vdvr/device.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/device.hpp"
+#include "vdvr/expert/common_memory.hpp"
 
 namespace vdvr {
 

@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "vdvr/device.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/device.hpp"
 #include "vdvr/expert/field_options.hpp"
 #include "vdvr/expert/grid.hpp"
 #include "vdvr/expert/progress.hpp"

@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "vdvr/expert/certify_picture.hpp"
-#include "vdvr/device.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/device.hpp"
+#include "vdvr/expert/certify_picture.hpp"
 #include "vdvr/expert/mixed_volume.hpp"
 #include "vdvr/expert/paged_volume.hpp"
 #include "vdvr/expert/progress.hpp"

@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "vdvr/device.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/device.hpp"
 
 namespace vdvr {
 

@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "vdvr/expert/certificate.hpp"
-#include "vdvr/device.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/device.hpp"
+#include "vdvr/expert/certificate.hpp"
 #include "vdvr/expert/image.hpp"
 #include "vdvr/expert/mixed_volume.hpp"
 #include "vdvr/expert/progress.hpp"

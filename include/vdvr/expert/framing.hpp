@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "vdvr/expert/camera.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/expert/camera.hpp"
 #include "vdvr/expert/mixed_volume.hpp"
 #include "vdvr/raycast.hpp"
 

@@ -7,8 +7,8 @@
 #include <memory>
 #include <span>
 
-#include "vdvr/expert/certified_points.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/expert/certified_points.hpp"
 #include "vdvr/expert/progress.hpp"
 #include "vdvr/vdvr_file.hpp"
 

@@ -5,9 +5,9 @@
 #include <memory>
 #include <optional>
 
-#include "vdvr/expert/certificate.hpp"
-#include "vdvr/device.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/device.hpp"
+#include "vdvr/expert/certificate.hpp"
 #include "vdvr/expert/image.hpp"
 #include "vdvr/expert/live_view.hpp"
 

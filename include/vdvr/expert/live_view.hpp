@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
+#include "vdvr/api.hpp"
 #include "vdvr/automatic_view.hpp"
 #include "vdvr/expert/certificate.hpp"
-#include "vdvr/api.hpp"
 #include "vdvr/expert/framing.hpp"
 #include "vdvr/expert/grid.hpp"
 #include "vdvr/expert/mixed_volume.hpp"

@@ -3,8 +3,8 @@
 
 #include <string>
 
-#include "vdvr/device.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/device.hpp"
 #include "vdvr/expert/grid.hpp"
 #include "vdvr/expert/progress.hpp"
 #include "vdvr/expert/reconstruct.hpp"

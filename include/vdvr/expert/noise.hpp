@@ -12,8 +12,8 @@
 #include <optional>
 #include <string>
 
-#include "vdvr/device.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/device.hpp"
 #include "vdvr/expert/field_options.hpp"
 #include "vdvr/expert/grid.hpp"
 #include "vdvr/expert/line_noise.hpp"

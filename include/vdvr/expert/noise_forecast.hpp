@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "vdvr/api.hpp"
-#include "vdvr/expert/field_options.hpp"
-#include "vdvr/expert/certify.hpp"
 #include "vdvr/device.hpp"
+#include "vdvr/expert/certify.hpp"
+#include "vdvr/expert/field_options.hpp"
 #include "vdvr/expert/grid.hpp"
 #include "vdvr/expert/noise.hpp"
 #include "vdvr/expert/plan.hpp"

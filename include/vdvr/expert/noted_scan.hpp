@@ -3,8 +3,8 @@
 
 #include <optional>
 
-#include "vdvr/expert/certificate.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/expert/certificate.hpp"
 #include "vdvr/expert/input_statement.hpp"
 #include "vdvr/expert/projections.hpp"
 

@@ -5,8 +5,8 @@
 #include <memory>
 #include <utility>
 
-#include "vdvr/device.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/device.hpp"
 #include "vdvr/expert/mixed_volume.hpp"
 
 namespace vdvr {

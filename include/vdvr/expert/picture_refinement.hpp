@@ -12,9 +12,9 @@
 #include <utility>
 #include <vector>
 
+#include "vdvr/api.hpp"
 #include "vdvr/expert/build.hpp"
 #include "vdvr/expert/camera.hpp"
-#include "vdvr/api.hpp"
 #include "vdvr/expert/image.hpp"
 #include "vdvr/expert/projections.hpp"
 #include "vdvr/expert/transfer_function.hpp"

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "vdvr/api.hpp"
+#include "vdvr/device.hpp"
 #include "vdvr/expert/certificate.hpp"
 #include "vdvr/expert/comparison.hpp"
-#include "vdvr/device.hpp"
-#include "vdvr/api.hpp"
 #include "vdvr/expert/mixed_volume.hpp"
 #include "vdvr/expert/reconstruct.hpp"
 

@@ -7,8 +7,8 @@
 #include <cstddef>
 #include <string>
 
-#include "vdvr/device.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/device.hpp"
 #include "vdvr/expert/mixed_volume.hpp"
 
 namespace vdvr {

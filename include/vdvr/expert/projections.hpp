@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "vdvr/expert/cone_geometry.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/expert/cone_geometry.hpp"
 #include "vdvr/expert/preparation_steps.hpp"
 #include "vdvr/expert/sample_array.hpp"
 

@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "vdvr/expert/certificate.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/expert/certificate.hpp"
 #include "vdvr/expert/mixed_volume.hpp"
 #include "vdvr/expert/progress.hpp"
 #include "vdvr/expert/projections.hpp"

@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <string>
 
-#include "vdvr/expert/cone_geometry.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/expert/cone_geometry.hpp"
 
 namespace vdvr {
 

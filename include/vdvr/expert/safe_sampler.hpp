@@ -6,9 +6,9 @@
 #include <optional>
 #include <string>
 
-#include "vdvr/expert/certificate.hpp"
-#include "vdvr/device.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/device.hpp"
+#include "vdvr/expert/certificate.hpp"
 #include "vdvr/expert/mixed_volume.hpp"
 #include "vdvr/expert/probe_sampler.hpp"
 

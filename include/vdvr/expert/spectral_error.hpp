@@ -5,10 +5,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "vdvr/expert/certificate.hpp"
-#include "vdvr/device.hpp"
-#include "vdvr/expert/error_map.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/device.hpp"
+#include "vdvr/expert/certificate.hpp"
+#include "vdvr/expert/error_map.hpp"
 #include "vdvr/expert/grid.hpp"
 #include "vdvr/expert/progress.hpp"
 #include "vdvr/expert/projections.hpp"

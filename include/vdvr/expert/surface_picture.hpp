@@ -1,8 +1,8 @@
 // Certified surfaces as pictures.
 #pragma once
 
-#include "vdvr/expert/certified_rays.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/expert/certified_rays.hpp"
 #include "vdvr/expert/image.hpp"
 
 namespace vdvr {

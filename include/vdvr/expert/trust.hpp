@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "vdvr/device.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/device.hpp"
 
 namespace vdvr {
 

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "vdvr/device.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/device.hpp"
 #include "vdvr/expert/progress.hpp"
 
 namespace vdvr {

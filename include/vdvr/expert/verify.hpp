@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "vdvr/expert/certificate.hpp"
-#include "vdvr/device.hpp"
 #include "vdvr/api.hpp"
+#include "vdvr/device.hpp"
+#include "vdvr/expert/certificate.hpp"
 #include "vdvr/expert/mixed_volume.hpp"
 #include "vdvr/expert/progress.hpp"
 #include "vdvr/expert/projections.hpp"
