@@ -254,6 +254,182 @@ RenderResult draw_one(const Stage& stage, const RenderOptions& o, const std::fil
   return result;
 }
 
+/// What the command makes of its words.
+struct Asked {
+  RenderOptions options;
+  Overlay overlay;
+  std::filesystem::path output;
+  OutputKind kind = OutputKind::picture;
+  bool turntable = false;
+  std::int64_t frames = 1;
+  std::string method;
+};
+
+/// Throws InputError for whatever can be refused before anything is read.
+Asked asked_of(const Arguments& args, const CommonOptions& common) {
+  Asked a;
+  a.options = render_options(args);
+  check_combination(args, a.options);
+  a.overlay = overlay_options(args, a.options.mode);
+  a.output = args.path("output");
+  a.turntable = args.has("turntable");
+  a.frames = args.integer_or("turntable", 1, 1, 9999);
+  a.kind = output_kind(a.output, a.turntable);
+  if (a.kind == OutputKind::values)
+    refuse(args, {"axes", "box", "colorbar", "caption", "plain"}, "is of pictures, not of values");
+  if (a.kind != OutputKind::folder)
+    refuse(args, {"resume", "give-up"}, "is of a turntable in a folder, whose frames are kept");
+  give_up_option(args);
+  const auto volume = file_of_volume(args.path("FILE"));
+  if (a.kind != OutputKind::folder) check_output(a.output, common.force, {volume});
+  if (asks_certify(args))
+    for (const auto& beside : beside_picture(a.output, a.options.mode))
+      check_output(beside, common.force, {volume});
+  a.method = method_option(args);
+  return a;
+}
+
+/// What was drawn, for its words and its JSON.
+struct Drawn {
+  RenderOptions options;
+  std::string method;
+  SafeSampler safe;
+  RenderResult result;
+  FramesDrawn turned{1, 0};
+  std::optional<CertifiedRender> made;
+  std::vector<std::string> notes;
+  bool certified = false;
+  [[nodiscard]] bool of_integrals() const { return options.mode == RenderMode::integral; }
+  [[nodiscard]] bool has_transfer() const {
+    return options.mode == RenderMode::dvr || options.mode == RenderMode::mip;
+  }
+  [[nodiscard]] const std::string& sampler_reason() const {
+    return safe.reason.empty() ? result.sampler_reason : safe.reason;
+  }
+};
+
+bool is_comparison(const Scene& scene) { return scene.certificate && scene.certificate->comparison; }
+
+/// What depends on the volume. Returns what the camera turns about.
+OrbitFrame look_at_volume(const Arguments& args, Source& source, Drawn& drawn, const Progress& progress) {
+  const Scene& scene = source.scene();
+  RenderOptions& o = drawn.options;
+  const Brightness bright = brightness_of(scene.volume);
+  o.surfaces = surfaces_for(args, bright.threshold);
+  // Of integrals it says what is framed, and --tf-range is no range of densities.
+  o.transfer =
+      drawn.of_integrals() ? two_material_transfer(bright) : transfer_for(args, bright, scene.volume.grid);
+  o.slice_range = given_range(args);
+  if (!o.slice_range && !drawn.of_integrals()) o.slice_range = std::pair{bright.grey_lo, bright.grey_hi};
+  drawn.safe = source.take_sampler(o.sampler, args.has("unverified"));
+  o.sampler = drawn.safe.sampler;
+  const Orbit orbit = orbit_options(args, kRenderOrbit);
+  const OrbitFrame frame = frame_for(args, scene.volume, o, orbit);
+  o.camera = camera_for(args, frame, orbit);
+  o.clip = clip_for(args, scene, progress);
+  o.skip_empty = !args.has("no-skip");
+  source.show(brick_quantity(args));
+  drawn.notes = notes_on(args, o, source);
+  // The base samples alone are another field than the one certified.
+  drawn.certified = scene.verified && drawn.method == "vdvr" && !is_comparison(scene) && source.trusted();
+  return frame;
+}
+
+/// A turn or one picture, into the output.
+void draw_asked(const Arguments& args, const CommonOptions& common, const Asked& asked, const Stage& stage,
+                Drawn& drawn, const Progress& progress) {
+  RenderOptions& o = drawn.options;
+  // All frames have the window of the first.
+  if (drawn.of_integrals() && asked.turntable && !o.slice_range)
+    o.slice_range = range_of_values(stage.source.draw(o).values);
+  if (asked.kind == OutputKind::folder) {
+    Turned all = turn_into_folder(args, common, stage, o, asked.frames, progress);
+    drawn.turned = all.frames;
+    drawn.result = std::move(all.last);
+  } else if (asked.turntable) {
+    drawn.result = turn_into_file(args, common, stage, o, asked.frames, asked.kind, progress);
+  } else if (drawn.made) {
+    drawn.result = drawn.made->picture.drawn;
+  } else {
+    drawn.result = draw_one(stage, o, asked.output, asked.kind);
+  }
+  if (drawn.of_integrals() && !o.slice_range) o.slice_range = range_of_values(drawn.result.values);
+}
+
+std::string stamp_of(const Drawn& drawn, Source& source) {
+  const Scene& scene = source.scene();
+  return drawn.method == "d2vr" ? "D2VR, straight from the projections: no certificate"
+         : drawn.certified      ? "certified"
+         : !source.trusted()    ? "by a device that failed its test: no certificate"
+         : is_comparison(scene) ? "for comparison: no certificate"
+         : scene.verified       ? "base samples alone: no certificate"
+         : scene.certificate    ? "UNVERIFIED: the content was not compared with the certificate"
+                                : "no certificate";
+}
+
+Json drawn_json(const Asked& asked, const Drawn& drawn, Source& source) {
+  const RenderOptions& o = drawn.options;
+  const RenderResult& result = drawn.result;
+  const bool lit = (o.mode == RenderMode::dvr || o.mode == RenderMode::iso) &&
+                   (o.output == RenderOutput::normal || (o.shading && o.output == RenderOutput::colour));
+  const auto& made = drawn.made;
+  return {{"output", asked.output.string()},
+          {"frames", asked.frames},
+          {"frames_kept", drawn.turned.kept},
+          {"verified", drawn.certified},
+          {"sampler", sampler_name(result.sampler)},
+          {"sampler_reason", drawn.sampler_reason()},
+          {"sampler_term",
+           drawn.certified ? sampler_term_json(source.certificate(), result.sampler == SamplerKind::image3d)
+                           : Json()},
+          {"gradient", lit ? Json(gradient_name(result.gradient)) : Json()},
+          {"samples", result.samples},
+          {"seconds", result.seconds},
+          {"epsilon_abs", drawn.certified ? Json(source.scene().certificate->epsilon_abs) : Json()},
+          {"outside_certificate", outside_certificate(o)},
+          {"transfer", drawn.has_transfer() ? transfer_json(o.transfer) : Json()},
+          {"window", drawn.of_integrals() ? Json(*o.slice_range) : Json()},
+          {"notes", drawn.notes},
+          {"method", drawn.method},
+          {"certificate", made ? made->json : Json()},
+          {"picture_tolerance", made && made->beyond ? tolerance_json(*made->beyond) : Json()},
+          {"resident_bytes", source.bytes()},
+          {"paging", paging_json(source.paging())},
+          {"device", source.device().info().name},
+          {"device_trusted", source.trusted()}};
+}
+
+void print_drawn(const Asked& asked, const Drawn& drawn, Source& source) {
+  const RenderOptions& o = drawn.options;
+  const RenderResult& result = drawn.result;
+  const double mebibytes = static_cast<double>(source.bytes()) / (1 << 20);
+  fmt::print("{}: {} x {}{}, {}\n", asked.output.string(), o.width, o.height,
+             asked.turntable ? fmt::format(", {} pictures", asked.frames) : "", stamp_of(drawn, source));
+  fmt::print("  sampler      {} ({})\n", sampler_name(result.sampler), drawn.sampler_reason());
+  print_paging(source.paging());
+  if (result.gradient == GradientKind::stored)
+    fmt::print("  gradient     stored at the samples, {:.1f} MiB on the device in all\n", mebibytes);
+  if (drawn.method == "d2vr") fmt::print("  projections  {:.1f} MiB on the device\n", mebibytes);
+  if (drawn.certified)
+    fmt::print("  certified    every sample of the field that was taken lies within {:.4g} of F\n",
+               source.scene().certificate->epsilon_abs);
+  if (drawn.of_integrals())
+    fmt::print("  grey         from {:.6g}, black, to {:.6g}, white\n", o.slice_range->first,
+               o.slice_range->second);
+  if (drawn.made) print_certain(*drawn.made);
+  fmt::print("  not covered  {}\n", outside_certificate(o));
+  std::vector<std::string> notes = drawn.notes;
+  if (drawn.has_transfer()) {
+    fmt::print("  transfer     {}, from {:.6g} to {:.6g}\n", o.transfer.name, o.transfer.points.front().value,
+               o.transfer.points.back().value);
+    if (!o.transfer.note.empty()) notes.push_back(o.transfer.note);
+  }
+  print_notes(notes);
+  // Slices count no samples along rays.
+  fmt::print("  {}{:.3f} s on {}\n", result.samples == 0 ? "" : fmt::format("{} samples in ", result.samples),
+             result.seconds, source.device().info().name);
+}
+
 }  // namespace
 
 int render_command(Arguments& args) {
@@ -267,142 +443,31 @@ int render_command(Arguments& args) {
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
   untrusted_option(args);
-  RenderOptions o = render_options(args);
-  check_combination(args, o);
-  const Overlay overlay = overlay_options(args, o.mode);
-  const auto path = args.path("FILE"), output = args.path("output");
-  const bool turntable = args.has("turntable");
-  const std::int64_t frames = args.integer_or("turntable", 1, 1, 9999);
-  const OutputKind kind = output_kind(output, turntable);
-  if (kind == OutputKind::values)
-    refuse(args, {"axes", "box", "colorbar", "caption", "plain"}, "is of pictures, not of values");
-  if (kind != OutputKind::folder)
-    refuse(args, {"resume", "give-up"}, "is of a turntable in a folder, whose frames are kept");
-  give_up_option(args);
-  if (kind != OutputKind::folder) check_output(output, common.force, {file_of_volume(path)});
-  const bool of_integrals = o.mode == RenderMode::integral;
-  // Colours are certified by the device, surfaces, maxima and integrals ray by ray on the host.
-  const bool certifies = asks_certify(args) && is_certified_by_ray(o.mode);
-  if (certifies)
-    for (const auto& beside : beside_picture(output, o.mode))
-      check_output(beside, common.force, {file_of_volume(path)});
-  if (o.mode == RenderMode::error) return render_error(args, common, o, output, kind);
+  const Asked asked = asked_of(args, common);
+  if (asked.options.mode == RenderMode::error)
+    return render_error(args, common, asked.options, asked.output, asked.kind);
 
-  const std::string method = method_option(args);
   ProgressLine progress(args.who(), common.quiet);
-  Source source(args, common, method, args.has("unverified"), progress.callback());
+  Source source(args, common, asked.method, args.has("unverified"), progress.callback());
   if (asks_certify(args)) source.require_trusted("certifying a picture");
-  const Scene& scene = source.scene();
-  const Brightness bright = brightness_of(scene.volume);
-  o.surfaces = surfaces_for(args, bright.threshold);
-  // Of integrals it says what is framed, and --tf-range is no range of densities.
-  o.transfer = of_integrals ? two_material_transfer(bright) : transfer_for(args, bright, scene.volume.grid);
-  o.slice_range = given_range(args);
-  if (!o.slice_range && !of_integrals) o.slice_range = std::pair{bright.grey_lo, bright.grey_hi};
-  const SafeSampler safe = source.take_sampler(o.sampler, args.has("unverified"));
-  o.sampler = safe.sampler;
-  const Orbit orbit = orbit_options(args, kRenderOrbit);
-  const OrbitFrame frame = frame_for(args, scene.volume, o, orbit);
-  o.camera = camera_for(args, frame, orbit);
-  o.clip = clip_for(args, scene, progress.callback());
-  const bool comparison = scene.certificate && scene.certificate->comparison;
-  std::vector<std::string> notes = notes_on(args, o, source);
-  // The base samples alone are another field than the one certified.
-  const bool certified = scene.verified && method == "vdvr" && !comparison && source.trusted();
-  o.skip_empty = !args.has("no-skip");
-  source.show(brick_quantity(args));
-
-  std::optional<CertifiedRender> made;
+  Drawn drawn;
+  drawn.options = asked.options;
+  drawn.method = asked.method;
+  const OrbitFrame frame = look_at_volume(args, source, drawn, progress.callback());
   if (asks_certify(args))
-    made = certify_render(args, common, source, o, overlay, output, progress.callback());
-  if (made && !certifies) {
+    drawn.made =
+        certify_render(args, common, source, drawn.options, asked.overlay, asked.output, progress.callback());
+  // Colours are certified by the device, surfaces, maxima and integrals ray by ray on the host.
+  if (drawn.made && !is_certified_by_ray(drawn.options.mode)) {
     progress.clear();
-    say_certified(args, common, source, *made, output);
+    say_certified(args, common, source, *drawn.made, asked.output);
     return 0;
   }
-  // All frames have the window of the first.
-  if (of_integrals && turntable && !o.slice_range) o.slice_range = range_of_values(source.draw(o).values);
-  const Stage stage{source, overlay, certified, frame};
-  FramesDrawn turned{1, 0};
-  const auto into_folder = [&] {
-    Turned all = turn_into_folder(args, common, stage, o, frames, progress.callback());
-    turned = all.frames;
-    return std::move(all.last);
-  };
-  const RenderResult result = kind == OutputKind::folder ? into_folder()
-                              : turntable
-                                  ? turn_into_file(args, common, stage, o, frames, kind, progress.callback())
-                              : made ? made->picture.drawn
-                                     : draw_one(stage, o, output, kind);
-  if (of_integrals && !o.slice_range) o.slice_range = range_of_values(result.values);
+  draw_asked(args, common, asked, {source, asked.overlay, drawn.certified, frame}, drawn,
+             progress.callback());
   progress.clear();
-
-  const std::string& sampler_reason = safe.reason.empty() ? result.sampler_reason : safe.reason;
-  const std::string stamp = method == "d2vr"    ? "D2VR, straight from the projections: no certificate"
-                            : certified         ? "certified"
-                            : !source.trusted() ? "by a device that failed its test: no certificate"
-                            : comparison        ? "for comparison: no certificate"
-                            : scene.verified    ? "base samples alone: no certificate"
-                            : scene.certificate
-                                ? "UNVERIFIED: the content was not compared with the certificate"
-                                : "no certificate";
-  const bool has_transfer = o.mode == RenderMode::dvr || o.mode == RenderMode::mip;
-  const bool lit = (o.mode == RenderMode::dvr || o.mode == RenderMode::iso) &&
-                   (o.output == RenderOutput::normal || (o.shading && o.output == RenderOutput::colour));
-  const Json json = {
-      {"output", output.string()},
-      {"frames", frames},
-      {"frames_kept", turned.kept},
-      {"verified", certified},
-      {"sampler", sampler_name(result.sampler)},
-      {"sampler_reason", sampler_reason},
-      {"sampler_term",
-       certified ? sampler_term_json(source.certificate(), result.sampler == SamplerKind::image3d) : Json()},
-      {"gradient", lit ? Json(gradient_name(result.gradient)) : Json()},
-      {"samples", result.samples},
-      {"seconds", result.seconds},
-      {"epsilon_abs", certified ? Json(scene.certificate->epsilon_abs) : Json()},
-      {"outside_certificate", outside_certificate(o)},
-      {"transfer", has_transfer ? transfer_json(o.transfer) : Json()},
-      {"window", of_integrals ? Json(*o.slice_range) : Json()},
-      {"notes", notes},
-      {"method", method},
-      {"certificate", made ? made->json : Json()},
-      {"picture_tolerance", made && made->beyond ? tolerance_json(*made->beyond) : Json()},
-      {"resident_bytes", source.bytes()},
-      {"paging", paging_json(source.paging())},
-      {"device", source.device().info().name},
-      {"device_trusted", source.trusted()}};
-  print_result(common, json, [&] {
-    fmt::print("{}: {} x {}{}, {}\n", output.string(), o.width, o.height,
-               turntable ? fmt::format(", {} pictures", frames) : "", stamp);
-    fmt::print("  sampler      {} ({})\n", sampler_name(result.sampler), sampler_reason);
-    print_paging(source.paging());
-    if (result.gradient == GradientKind::stored)
-      fmt::print("  gradient     stored at the samples, {:.1f} MiB on the device in all\n",
-                 static_cast<double>(source.bytes()) / (1 << 20));
-    if (method == "d2vr")
-      fmt::print("  projections  {:.1f} MiB on the device\n",
-                 static_cast<double>(source.bytes()) / (1 << 20));
-    if (certified)
-      fmt::print("  certified    every sample of the field that was taken lies within {:.4g} of F\n",
-                 scene.certificate->epsilon_abs);
-    if (of_integrals)
-      fmt::print("  grey         from {:.6g}, black, to {:.6g}, white\n", o.slice_range->first,
-                 o.slice_range->second);
-    if (made) print_certain(*made);
-    fmt::print("  not covered  {}\n", outside_certificate(o));
-    if (has_transfer)
-      fmt::print("  transfer     {}, from {:.6g} to {:.6g}\n", o.transfer.name,
-                 o.transfer.points.front().value, o.transfer.points.back().value);
-    if (has_transfer && !o.transfer.note.empty()) notes.push_back(o.transfer.note);
-    print_notes(notes);
-    // Slices count no samples along rays.
-    fmt::print("  {}{:.3f} s on {}\n",
-               result.samples == 0 ? "" : fmt::format("{} samples in ", result.samples), result.seconds,
-               source.device().info().name);
-  });
-  if (made) require_within(output, made->beyond);
+  print_result(common, drawn_json(asked, drawn, source), [&] { print_drawn(asked, drawn, source); });
+  if (drawn.made) require_within(asked.output, drawn.made->beyond);
   return 0;
 }
 
