@@ -12,6 +12,7 @@ NB_MODULE(_core, m) {
   vdvr::python::add_scans(m);
   vdvr::python::add_pictures(m);
   vdvr::python::add_volumes(m);
+  vdvr::python::add_certified_pictures(m);
   vdvr::python::add_viewers(m);
   vdvr::python::add_files(m);
 }
