@@ -172,7 +172,7 @@ assert 0 < picture.mean + 1 and "surface" in repr(picture)
 assert volume.certify_picture(size=(16, 16), shading=False, tolerance=0).worst <= volume.certify_picture(
     size=(16, 16), shading=False, step=1.0).worst
 raises(vdvr.InputError, "exists already", lambda: picture.save("iso.png"))
-raises(vdvr.InputError, ".png", lambda: picture.save("iso.npy"))
+raises(vdvr.InputError, ".png", lambda: picture.save("other.npy"))
 raises(vdvr.InputError, "none of exact", lambda: volume.certify_picture(form="quick"))
 raises(vdvr.InputError, "certified", lambda: volume.certify_picture(mode="error"))
 raises(vdvr.FileError, "no-such", lambda: vdvr.verify_picture("no-such.json", volume))
