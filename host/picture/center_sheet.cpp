@@ -157,11 +157,12 @@ std::string merit_text(const CenterSheet& sheet) {
 void draw_chart(Image& image, std::int64_t top, const CenterSheetOptions& options, const CenterSheet& sheet) {
   const std::int64_t x0 = kEdge + 10, x1 = image.width - kEdge - 10, y0 = top + kLine, y1 = y0 + kChart;
   draw_text(image, kEdge, static_cast<double>(top), merit_text(sheet), kText, kInk);
-  const auto [low, high] = std::minmax_element(sheet.merit.begin(), sheet.merit.end());
+  const auto ends = std::minmax_element(sheet.merit.begin(), sheet.merit.end());
+  const double low = *ends.first, high = *ends.second;
   const double first = options.centers.front(), span = options.centers.back() - first;
   const auto place = [&](std::size_t i) {
     const double x = span > 0 ? (options.centers[i] - first) / span : 0.5,
-                 y = *high > *low ? (sheet.merit[i] - *low) / (*high - *low) : 0.5;
+                 y = high > low ? (sheet.merit[i] - low) / (high - low) : 0.5;
     return std::array<std::int64_t, 2>{x0 + std::lround(x * static_cast<double>(x1 - x0 - 80)) + 40,
                                        y1 - 8 - std::lround(y * static_cast<double>(kChart - 16))};
   };

@@ -270,12 +270,9 @@ BOOST_AUTO_TEST_CASE(a_build_is_refined_until_its_pictures_are_certain) {
 BOOST_AUTO_TEST_CASE(views_that_make_no_sense_are_refused_by_name) {
   const std::string views = at("bad.json"), out = at("bad.vdvr");
   const std::vector<std::pair<std::string, std::string>> bad{
-      {"[]", "bad.json: is not a JSON object"},
-      {R"({"views": []})", "views"},
-      {R"({"size": [0, 4], "views": [{}]})", "size"},
-      {R"({"view": [{}]})", "view"},
-      {R"({"views": [{"zoom": 0}]})", "zoom"},
-      {R"({"views": [{"position": [0, 0, 0]}]})", "views"}};
+      {"[]", "bad.json: is not a JSON object"},       {R"({"views": []})", "views"},
+      {R"({"size": [0, 4], "views": [{}]})", "size"}, {R"({"view": [{}]})", "view"},
+      {R"({"views": [{"zoom": 0}]})", "zoom"},        {R"({"views": [{"position": [0, 0, 0]}]})", "views"}};
   for (const auto& [text, named] : bad) {
     write(views, text);
     check_refused({"build", small_scan(), "--picture-tolerance", "8", "--views", views, "-o", out}, named);

@@ -213,19 +213,20 @@ int simulate_command(Arguments& args) {
   }
   progress.clear();
 
-  const auto [lo, hi] = std::minmax_element(scan.data.begin(), scan.data.end());
+  const auto ends = std::minmax_element(scan.data.begin(), scan.data.end());
   Json json = {{"output", output.string()},
                {"object", phantom.name},
                {"geometry", geometry_json(scan.geometry)},
                {"band_limited", setup.scan.band_limited},
                {"noise_sigma", setup.scan.noise_sigma},
                {"photons", counts ? Json(counts->photons) : Json()},
-               {"range", {*lo, *hi}},
+               {"range", {*ends.first, *ends.second}},
                {"notes", scan.report.notes}};
   if (scan.cone) json["cone"] = cone_json(scan);
   print_result(common, json, [&] {
     fmt::print("{}: {} views of {} x {} pixels of {}, line integrals {:.6g} to {:.6g}\n", output.string(),
-               scan.geometry.views(), scan.geometry.columns, scan.geometry.rows, phantom.name, *lo, *hi);
+               scan.geometry.views(), scan.geometry.columns, scan.geometry.rows, phantom.name, *ends.first,
+               *ends.second);
     if (scan.cone) print_cone(scan);
     print_notes(scan.report.notes);
   });
