@@ -158,7 +158,7 @@ void draw_chart(Image& image, std::int64_t top, const CenterSheetOptions& option
   const std::int64_t x0 = kEdge + 10, x1 = image.width - kEdge - 10, y0 = top + kLine, y1 = y0 + kChart;
   draw_text(image, kEdge, static_cast<double>(top), merit_text(sheet), kText, kInk);
   const auto ends = std::minmax_element(sheet.merit.begin(), sheet.merit.end());
-  const double low = *ends.first, high = *ends.second;
+  const auto low = *ends.first, high = *ends.second;
   const double first = options.centers.front(), span = options.centers.back() - first;
   const auto place = [&](std::size_t i) {
     const double x = span > 0 ? (options.centers[i] - first) / span : 0.5,

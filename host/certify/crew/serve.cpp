@@ -252,17 +252,17 @@ class Server {
 
 void serve(Messenger& messenger) { Server(messenger).run(); }
 
-void wake(Device& leader, const CrewOptions& options) {
+void wake(Device& device, const CrewOptions& options) {
   Messenger* messenger = options.messenger;
   if (!messenger || messenger->others() == 0) return;
-  const auto send_to_all = [messenger](const Bytes& message) {
+  const auto send = [messenger](const Bytes& message) {
     for (int process = 1; process <= messenger->others(); ++process) messenger->send(process, message);
   };
-  send_to_all(message_to_open(CrewWord::wake, options));
+  send(message_to_open(CrewWord::wake, options));
   const auto thread = std::this_thread::get_id();
-  leader.state().on_program = [send, thread](const std::string& name, const opencl::Defines& defines) {
+  device.state().on_program = [send, thread](const std::string& name, const opencl::Defines& defines) {
     if (std::this_thread::get_id() != thread) return;  // a messenger has one
-    send_to_all(message_of(CrewWord::warm, name, defines));
+    send(message_of(CrewWord::warm, name, defines));
   };
 }
 
