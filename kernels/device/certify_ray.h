@@ -1,5 +1,6 @@
 // A ray in pieces, each within one cell of one brick: what the field can be on it, and what the transfer
-// function then shows (docs/pixel-bounds.md). Included by kernels of kernels/picture/pixel, after raycast_dvr.h.
+// function then shows (docs/pixel-bounds.md). Included by kernels of kernels/picture/pixel, after
+// raycast_dvr.h.
 //
 // VDVR_LIGHT: pieces also end where the drawn steps do, and each has the light that its step was drawn with.
 #ifndef VDVR_CERTIFY_RAY_H

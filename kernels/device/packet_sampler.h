@@ -5,8 +5,8 @@
 //
 // In packets of several lanes offsets are 32-bit: the launcher takes them only where every offset fits.
 //
-// VDVR_LIT: the buffer holds lit samples (host/volume/sampler/lit_samples.hpp), float32, and behind them all the
-// gradients there, so that light costs no further samples.
+// VDVR_LIT: the buffer holds lit samples (host/volume/sampler/lit_samples.hpp), float32, and behind them all
+// the gradients there, so that light costs no further samples.
 #ifndef VDVR_PACKET_SAMPLER_H
 #define VDVR_PACKET_SAMPLER_H
 #ifndef VDVR_LIT

@@ -2,8 +2,8 @@
 #ifndef VDVR_GOLD_SHAPE_H
 #define VDVR_GOLD_SHAPE_H
 
-// With the bricks under them. Passed by value from host/certify/gold/gold_batch.cpp to classify.cl and measure.cl. 48
-// bytes.
+// With the bricks under them. Passed by value from host/certify/gold/gold_batch.cpp to classify.cl and
+// cell_test.cl. 48 bytes.
 typedef struct {
   int nx, ny, nz;                    // nodes of a block, without its halo
   int halo;                          // nodes on every side

@@ -1,6 +1,6 @@
-// What kernels/certify/kept/interpolate.cl is told of the arrays it reads and writes: floats between neighbours along
-// an axis, and where its own part begins. z is contiguous, and every column begins at a multiple of 16.
-// Passed by value from host/certify/kept/interpolate_gold.cpp.
+// What kernels/certify/kept/interpolate.cl is told of the arrays it reads and writes: floats between
+// neighbours along an axis, and where its own part begins. z is contiguous, and every column begins at a
+// multiple of 16. Passed by value from host/certify/kept/interpolate_gold.cpp.
 #ifndef VDVR_INTERPOLATE_GOLD_H
 #define VDVR_INTERPOLATE_GOLD_H
 

@@ -1,6 +1,6 @@
-// What one frame's kernels need besides the field. Filled by host/picture/render/raycast.cpp, read by raycast.cl;
-// compiled by both sides. "cells" are base-cell coordinates per axis; "lengths" are multiples of the smallest
-// base spacing.
+// What one frame's kernels need besides the field. Filled by host/picture/render/raycast.cpp, read by
+// raycast.cl; compiled by both sides. "cells" are base-cell coordinates per axis; "lengths" are multiples of
+// the smallest base spacing.
 #ifndef VDVR_RAYCAST_PARAMS_H
 #define VDVR_RAYCAST_PARAMS_H
 

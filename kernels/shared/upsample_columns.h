@@ -1,5 +1,5 @@
-// Columns of a detector and the finer ones made of them. Passed by value from host/field/fbp/upsample_columns.cpp
-// to upsample_columns.cl.
+// Columns of a detector and the finer ones made of them. Passed by value from
+// host/field/fbp/upsample_columns.cpp to upsample_columns.cl.
 #ifndef VDVR_UPSAMPLE_COLUMNS_H
 #define VDVR_UPSAMPLE_COLUMNS_H
 

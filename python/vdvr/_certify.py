@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import inspect
 import os
-from typing import Any, Callable, Optional, Sequence, Tuple, TypeVar, Union
+from typing import Any, Optional, Sequence, Tuple, Union
 
 from . import _core
-from ._choices import Path, choice, number, numbers, tolerance
+from ._choices import Path, choice, number, numbers, takes, tolerance
 from ._devices import DeviceLike, device as open_device
 from ._scans import Progress, Scan
 from ._volume import Volume, compressed, open as open_volume, path_or_volume
-
-_F = TypeVar("_F", bound=Callable[..., Any])
 
 
 def _options(
@@ -97,17 +94,6 @@ def _coarsening(base: Sequence[int]) -> Sequence[int]:
     return [int(n).bit_length() - 1 for n in reversed(cells)]
 
 
-def _takes_options(function: _F) -> _F:
-    """Gives a function with **options the names, defaults and words of _options, which owns them."""
-    own = [p for p in inspect.signature(function).parameters.values() if p.kind is not p.VAR_KEYWORD]
-    theirs = inspect.signature(_options)
-    function.__signature__ = inspect.signature(function).replace(  # type: ignore[attr-defined]
-        parameters=[*own, *theirs.parameters.values()])
-    head, words = inspect.getdoc(_options), inspect.getdoc(function) or ""
-    function.__doc__ = words.replace("OPTIONS", (head or "").strip())
-    return function
-
-
 def _checked(scan: Any) -> Any:
     if not isinstance(scan, Scan):
         raise _core.InputError(f"scan: a {type(scan).__name__}; give a vdvr.Scan, or what read_scan returns")
@@ -119,7 +105,7 @@ def _stated(scan: Any) -> "_core.InputStatement":
     return scan._understood.stated if isinstance(scan, Scan) else _core.InputStatement()
 
 
-@_takes_options
+@takes(_options)
 def plan(
     scan: Scan,
     epsilon: Union[str, float, None] = None,
@@ -144,7 +130,7 @@ def plan(
     return _core.make_plan(open_device(device), projections, asked, wanted, progress)
 
 
-@_takes_options
+@takes(_options)
 def build(
     scan: Scan,
     epsilon: Union[str, float, None] = None,

@@ -2,14 +2,32 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import os
-from typing import Any, Iterable, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Iterable, Optional, Sequence, Tuple, TypeVar, Union
 
 from . import _core
 
 #: A path to a file.
 Path = Union[str, "os.PathLike[str]"]
+
+_F = TypeVar("_F", bound=Callable[..., Any])
+
+
+def takes(owner: Callable[..., Any]) -> Callable[[_F], _F]:
+    """Gives a function that hands **keywords on to `owner` the names, defaults and words of these: OPTIONS in its own
+    words stands for the owner's."""
+    def with_keywords(function: _F) -> _F:
+        own = [p for p in inspect.signature(function).parameters.values() if p.kind is not p.VAR_KEYWORD]
+        theirs = [p for p in inspect.signature(owner).parameters.values() if p.kind is p.KEYWORD_ONLY]
+        function.__signature__ = inspect.signature(function).replace(  # type: ignore[attr-defined]
+            parameters=[*own, *theirs])
+        words = inspect.getdoc(function) or ""
+        function.__doc__ = words.replace("OPTIONS", (inspect.getdoc(owner) or "").strip())
+        return function
+
+    return with_keywords
 
 
 def choice(kind: Any, word: Any, name: str) -> Any:

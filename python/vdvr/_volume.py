@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Callable, Dict, List, Optional, Sequence,
 import numpy as np
 
 from . import _core
-from ._choices import Path, axis, choice, number, numbers, sizes, spacings
+from ._choices import Path, axis, choice, number, numbers, sizes, spacings, takes
 from ._devices import DeviceLike, device as open_device
 
 if TYPE_CHECKING:
@@ -121,127 +121,6 @@ class Volume:
 
     # --- pictures ---
 
-    def render(
-        self,
-        size: Tuple[int, int] = (512, 512),
-        mode: str = "dvr",
-        transfer: TransferLike = None,
-        *,
-        azimuth: float = 30.0,
-        elevation: float = 20.0,
-        zoom: float = 1.0,
-        frame: str = "shown",
-        camera: Optional[Dict[str, Any]] = None,
-        transfer_range: Optional[Tuple[float, float]] = None,
-        iso: Union[float, Sequence[float], None] = None,
-        iso_opacity: Optional[Sequence[float]] = None,
-        slice_axis: str = "z",
-        slice_position: Optional[float] = None,
-        clip: Optional[Sequence[float]] = None,
-        show: str = "colour",
-        step: float = 1.0,
-        step_mode: Optional[str] = None,
-        classification: str = "post",
-        gradient: str = "auto",
-        shading: bool = True,
-        lights: Optional[Sequence[Union[str, Sequence[float]]]] = None,
-        background: Optional[Sequence[float]] = None,
-        sampler: str = "auto",
-        values: bool = False,
-        device: DeviceLike = None,
-    ) -> "NDArray[Any]":
-        """One picture: uint8 [y, x, 3], sRGB, row 0 on top. That of `vdvr render` with the same options;
-        a slice that of `--plain`, without a frame.
-
-        Parameters
-        ----------
-        size : width and height, pixels.
-        mode : "dvr", "iso", "mip", "integral" (an X-ray picture: the field summed up along each ray), "slice", or
-            "error": on a slice what the certificate bounds |V - F| by.
-        transfer : a preset (`transfer_presets()`), a file of VDVR, 3D Slicer or ParaView, or points (density,
-            red, green, blue, opacity of one cell); by default one that suits the volume.
-        transfer_range : stretches it over these densities; of a slice and of integrals the window, black to
-            white (of integrals by default the picture's least and largest).
-        azimuth, elevation : degrees; azimuth 0 looks along -y with x to the right, elevation is towards -z.
-        zoom : 1 fits what `frame` says: "shown", what the transfer function or the surfaces show, or "grid", the
-            whole grid (which costs no look at the samples).
-        camera : {"position", "focal_point", "view_up", "view_angle"} instead of these; x, y, z and degrees.
-        iso : densities of surfaces, mode "iso"; by default one between background and object.
-        slice_axis, slice_position : "x", "y" or "z", and where on it; by default the middle.
-        clip : x0, y0, z0, x1, y1, z1: draw what lies in this box alone; of every mode but slices.
-        show : "colour", "depth", "normal", or of the samples behind a pixel "error", their largest bound, "sigma", what the
-            scan's own noise leaves in them (estimated), "error-in-sigma", the one in units of the other; mode "error" too.
-        step : of a ray, in cells.
-        step_mode : "adaptive" (finer where the transfer function changes much along one), "fixed" or "level" (step
-            / 2^l in bricks of level l); by default adaptive of mode "dvr" with classification "post", else fixed.
-        lights : "head" for one at the eye, or directions x, y, z towards the light; by default the first.
-        background : red, green, blue, 0 to 1; or six numbers, of the top and of the bottom.
-        values : float32 [y, x] of what lies behind the pixels instead, NaN where nothing does
-            (docs/rendering.md); of `show="normal"` [y, x, 3].
-        """
-        in_sigma = {"sigma": _core.BrickQuantity.sigma, "error-in-sigma": _core.BrickQuantity.bound_in_sigma}
-        quantity = in_sigma.get(show, _core.BrickQuantity.bound)
-        if mode == "error":
-            return self._held.error_picture(self._slice(size, slice_axis, slice_position), quantity, values)
-        o = self._view(size, mode, transfer, azimuth=azimuth, elevation=elevation, zoom=zoom, frame=frame, camera=camera,
-                       transfer_range=transfer_range, iso=iso, iso_opacity=iso_opacity, slice_axis=slice_axis,
-                       slice_position=slice_position, clip=clip, step=step, step_mode=step_mode,
-                       classification=classification, gradient=gradient, shading=shading, lights=lights,
-                       background=background, sampler=sampler)
-        o.output = choice(_core.RenderOutput, "error" if show in in_sigma else show, "show")
-        return self._held.render(self._open_device(device), o, quantity, values)
-
-    def certify_picture(
-        self,
-        size: Tuple[int, int] = (512, 512),
-        mode: str = "dvr",
-        transfer: TransferLike = None,
-        *,
-        form: str = "exact",
-        light: str = "as-drawn",
-        parts: Optional[float] = None,
-        tolerance: Optional[float] = None,
-        device: DeviceLike = None,
-        progress: Optional[Callable[[str, float], object]] = None,
-        **view: Any,
-    ) -> "CertifiedPicture":
-        """A picture, and for every pixel an interval that holds what F itself would show: that of
-        `vdvr render --certify`.
-
-        Parameters
-        ----------
-        size, mode, transfer, **view : as of `render`, of modes "dvr", "iso" (one surface), "mip", "integral" and
-            "slice". Only what is covered is drawn. Of "dvr" steps are chosen, and shortened while that narrows the
-            bound much, unless `step`, `step_mode` or `classification` is given.
-        form : of mode "dvr": "exact", "box" (some per cent wider) or "fast" (in one pass, 1.4 to 3 times as wide).
-        light : of mode "dvr": "as-drawn" (colour and opacity of F under V's light) or "lit" (F's own).
-        parts : of mode "dvr": smaller is narrower and slower (default 0.5).
-        tolerance : levels of 255 that every pixel shall be certain to; drawn finer for it. `worst` says whether it is.
-        """
-        request = _core.PictureRequest()
-        request.keep_steps = any(view.get(name) is not None for name in ("step", "step_mode", "classification"))
-        request.options = self._view(size, mode, transfer, **view)
-        _one_of(form, ("exact", "box", "fast"), "form")
-        _one_of(light, ("as-drawn", "lit"), "light")
-        request.certify.fast = form == "fast"
-        request.certify.box = form == "box"
-        if parts is not None:
-            request.certify.kappa = number(parts, "parts")
-        request.lit = light == "lit"
-        request.tolerance = None if tolerance is None else number(tolerance, "tolerance")
-        return CertifiedPicture(_core.certify_picture(self._held, self._open_device(device), request, progress))
-
-    def _slice(self, size: Tuple[int, int], slice_axis: str, slice_position: Optional[float]) -> "_core.RenderOptions":
-        """Of mode "error", which has a position in any case."""
-        o = _core.RenderOptions()
-        o.width, o.height = sizes(size)
-        o.mode = _core.RenderMode.error
-        o.slice_axis = axis(slice_axis)
-        g, a = self.grid, o.slice_axis
-        middle = g.origin[a] + 0.5 * g.cells[a] * g.spacing[a]
-        o.slice_position = middle if slice_position is None else number(slice_position, "slice_position")
-        return o
-
     def _view(
         self,
         size: Tuple[int, int],
@@ -268,6 +147,20 @@ class Volume:
         background: Optional[Sequence[float]] = None,
         sampler: str = "auto",
     ) -> "_core.RenderOptions":
+        """azimuth, elevation : degrees; azimuth 0 looks along -y with x to the right, elevation is towards -z.
+        zoom : 1 fits what `frame` says: "shown", what the transfer function or the surfaces show, or "grid", the
+            whole grid (which costs no look at the samples).
+        camera : {"position", "focal_point", "view_up", "view_angle"} instead of these; x, y, z and degrees.
+        transfer_range : stretches the transfer function over these densities; of a slice and of integrals the window,
+            black to white (of integrals by default the picture's least and largest).
+        iso : densities of surfaces, mode "iso"; by default one between background and object.
+        slice_axis, slice_position : "x", "y" or "z", and where on it; by default the middle.
+        clip : x0, y0, z0, x1, y1, z1: draw what lies in this box alone; of every mode but slices.
+        step : of a ray, in cells.
+        step_mode : "adaptive" (finer where the transfer function changes much along one), "fixed" or "level" (step
+            / 2^l in bricks of level l); by default adaptive of mode "dvr" with classification "post", else fixed.
+        lights : "head" for one at the eye, or directions x, y, z towards the light; by default the first.
+        background : red, green, blue, 0 to 1; or six numbers, of the top and of the bottom."""
         o = _core.RenderOptions()
         o.width, o.height = sizes(size)
         o.mode = choice(_core.RenderMode, mode, "mode")
@@ -300,6 +193,96 @@ class Volume:
             o.background_top, o.background_bottom = given[:3], given[-3:]
         o.sampler = choice(_core.SamplerKind, sampler, "sampler")
         return o
+
+    def _slice(self, size: Tuple[int, int], slice_axis: str = "z", slice_position: Optional[float] = None,
+               **_: Any) -> "_core.RenderOptions":
+        """Of mode "error", which has a position in any case."""
+        o = _core.RenderOptions()
+        o.width, o.height = sizes(size)
+        o.mode = _core.RenderMode.error
+        o.slice_axis = axis(slice_axis)
+        g, a = self.grid, o.slice_axis
+        middle = g.origin[a] + 0.5 * g.cells[a] * g.spacing[a]
+        o.slice_position = middle if slice_position is None else number(slice_position, "slice_position")
+        return o
+
+    @takes(_view)
+    def render(
+        self,
+        size: Tuple[int, int] = (512, 512),
+        mode: str = "dvr",
+        transfer: TransferLike = None,
+        *,
+        show: str = "colour",
+        values: bool = False,
+        device: DeviceLike = None,
+        **view: Any,
+    ) -> "NDArray[Any]":
+        """One picture: uint8 [y, x, 3], sRGB, row 0 on top. That of `vdvr render` with the same options;
+        a slice that of `--plain`, without a frame.
+
+        Parameters
+        ----------
+        size : width and height, pixels.
+        mode : "dvr", "iso", "mip", "integral" (an X-ray picture: the field summed up along each ray), "slice", or
+            "error": on a slice what the certificate bounds |V - F| by.
+        transfer : a preset (`transfer_presets()`), a file of VDVR, 3D Slicer or ParaView, or points (density,
+            red, green, blue, opacity of one cell); by default one that suits the volume.
+        show : "colour", "depth", "normal", or of the samples behind a pixel "error", their largest bound, "sigma", what the
+            scan's own noise leaves in them (estimated), "error-in-sigma", the one in units of the other; mode "error" too.
+        values : float32 [y, x] of what lies behind the pixels instead, NaN where nothing does
+            (docs/rendering.md); of `show="normal"` [y, x, 3].
+        OPTIONS
+        """
+        in_sigma = {"sigma": _core.BrickQuantity.sigma, "error-in-sigma": _core.BrickQuantity.bound_in_sigma}
+        quantity = in_sigma.get(show, _core.BrickQuantity.bound)
+        if mode == "error":
+            return self._held.error_picture(self._slice(size, **view), quantity, values)
+        o = self._view(size, mode, transfer, **view)
+        o.output = choice(_core.RenderOutput, "error" if show in in_sigma else show, "show")
+        return self._held.render(self._open_device(device), o, quantity, values)
+
+    @takes(_view)
+    def certify_picture(
+        self,
+        size: Tuple[int, int] = (512, 512),
+        mode: str = "dvr",
+        transfer: TransferLike = None,
+        *,
+        form: str = "exact",
+        light: str = "as-drawn",
+        parts: Optional[float] = None,
+        tolerance: Optional[float] = None,
+        device: DeviceLike = None,
+        progress: Optional[Callable[[str, float], object]] = None,
+        **view: Any,
+    ) -> "CertifiedPicture":
+        """A picture, and for every pixel an interval that holds what F itself would show: that of
+        `vdvr render --certify`.
+
+        Parameters
+        ----------
+        size, mode, transfer : as of `render`; modes "dvr", "iso" (one surface), "mip", "integral" and "slice". Only
+            what is covered is drawn. Of "dvr" steps are chosen, and shortened while that narrows the bound much, unless
+            `step`, `step_mode` or `classification` is given.
+        form : of mode "dvr": "exact", "box" (some per cent wider) or "fast" (in one pass, 1.4 to 3 times as wide).
+        light : of mode "dvr": "as-drawn" (colour and opacity of F under V's light) or "lit" (F's own).
+        parts : of mode "dvr": smaller is narrower and slower (default 0.5).
+        tolerance : levels of 255 that every pixel shall be certain to; drawn finer for it. `worst` says whether it is.
+        OPTIONS
+        """
+        request = _core.PictureRequest()
+        request.keep_steps = any(view.get(name) is not None for name in ("step", "step_mode", "classification"))
+        request.options = self._view(size, mode, transfer, **view)
+        _one_of(form, ("exact", "box", "fast"), "form")
+        _one_of(light, ("as-drawn", "lit"), "light")
+        request.certify.fast = form == "fast"
+        request.certify.box = form == "box"
+        if parts is not None:
+            request.certify.kappa = number(parts, "parts")
+        request.lit = light == "lit"
+        request.tolerance = None if tolerance is None else number(tolerance, "tolerance")
+        return CertifiedPicture(_core.certify_picture(self._held, self._open_device(device), request, progress))
 
     def _transfer(self, transfer: TransferLike, window: Optional[Tuple[float, float]]) -> "_core.TransferFunction":
         if isinstance(transfer, str) and transfer in _core.transfer_presets():

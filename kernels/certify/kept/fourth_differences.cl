@@ -1,6 +1,7 @@
 // The largest fourth differences of gold on closed bricks: along x, y, z, then xy, xz, yz
 // (docs/error-bounds.md, section 5). Layouts: float gold[y][x][stride] with two nodes around the bricks on
-// every side; float margin[y][x]; float out[brick z][y][x][6]. Called by host/certify/kept/brick_remainder.cpp.
+// every side; float margin[y][x]; float out[brick z][y][x][6]. Called by
+// host/certify/kept/brick_remainder.cpp.
 #include "device/lanes.h"
 #include "device/shared_column.h"
 #include "shared/fourth_differences.h"

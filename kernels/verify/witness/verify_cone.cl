@@ -8,9 +8,9 @@
 #include "shared/verify_cone.h"
 #include "shared/verify_nodes.h"
 
-// About the middle of a block, as host/verify/witness/verify_cone_nodes.cpp fills it. xyz of a float4: by how much
-// the numerator, or lambda, changes from node to node; w: what it is in the middle. A place counts from the
-// column and the row in `whole`, so chosen that it is positive in all of the block.
+// About the middle of a block, as host/verify/witness/verify_cone_nodes.cpp fills it. xyz of a float4: by how
+// much the numerator, or lambda, changes from node to node; w: what it is in the middle. A place counts from
+// the column and the row in `whole`, so chosen that it is positive in all of the block.
 typedef struct {
   float4 u, v, lambda;
   int4 whole;
