@@ -168,7 +168,7 @@ for mode, array in (("dvr", (24, 32, 3)), ("slice", (24, 32, 3)), ("mip", (24, 3
     found = vdvr.verify_picture(f"{mode}.certificate.json", volume, scan, rays=3)
     assert found and found.same_pixels and found.rays_outside == 0 and not found.failures
     assert found.rays == (0 if certificate.get("light") == "as drawn" and certificate["picture"]["gradient"] != "central" else 3)
-assert 0 < picture.mean + 1 and "surface" in repr(picture)
+assert "surface" in repr(picture)
 assert volume.certify_picture(size=(16, 16), shading=False, tolerance=0).worst <= volume.certify_picture(
     size=(16, 16), shading=False, step=1.0).worst
 raises(vdvr.InputError, "exists already", lambda: picture.save("iso.png"))
