@@ -162,7 +162,7 @@ OpenBricks open_bricks(const Plan& plan, const std::vector<float>& base, const I
                                    to_world(in.plan.epsilon_abs + 1.1 * more, in.units)));
 }
 
-// Of blocks of either rate, which lie on one lattice: whole cells of it, in order, that hold as many bricks
+// Of blocks of all rates, which lie on one lattice: whole cells of it, in order, that hold as many bricks
 // to test as those of the other shares.
 void keep_share(const Inputs& in, const BuildShare& share, std::vector<std::uint8_t>& near) {
   const Bricks bricks(in.plan.grid, in.plan.layout.granularity);

@@ -1,4 +1,4 @@
-// The node test at two rates of gold.
+// The node test at several rates of gold.
 #include "host/certify/classify_bricks.hpp"
 
 #include <algorithm>
@@ -27,7 +27,19 @@ bool passes(const BrickMeasure& m, double tolerance) {
 
 }  // namespace
 
-Verdict coarse_verdict(const BrickMeasure& m, double tolerance) {
+namespace {
+
+// Measured on finer gold than before. Either test bounds |V - F|; cells that only the coarser gold tested
+// hold no point of which a certificate speaks.
+BrickMeasure sharper_of(const BrickMeasure& before, BrickMeasure now) {
+  now.total = std::clamp(now.total, 0.0f, before.total);
+  now.error = std::max(now.error, before.error);
+  return now;
+}
+
+}  // namespace
+
+Verdict verdict_of(const BrickMeasure& m, double tolerance) {
   // Each rate's total bounds |V - F|: what passes here has passed.
   if (passes(m, tolerance)) return Verdict::within;
   return static_cast<double>(m.error) > tolerance ? Verdict::beyond : Verdict::undecided;
@@ -39,6 +51,7 @@ ClassifyBricks::ClassifyBricks(JournalledRates& gold, OpenBricks& bricks, HostMe
       host_(host),
       fine_(gold.fine),
       coarse_(gold.coarse),
+      sharper_(gold.sharper),
       progress_(progress),
       whole_progress_(std::move(progress)),
       refuse_(std::move(refuse)) {}
@@ -63,7 +76,7 @@ void ClassifyBricks::classify(const DeviceField& base, const NodeTolerance& tole
                 [&](const std::vector<std::uint8_t>& of_band) { classify_band(base, tolerance, of_band); });
 }
 
-// Whole blocks of either rate, so that a block is the same in a band as in all.
+// Whole blocks of each rate, so that a block is the same in a band as in all.
 void ClassifyBricks::for_each_band(const std::vector<std::uint8_t>& selected, const Work& work) {
   const GoldStream& fine = fine_.gold();
   const Bricks bricks(bricks_.grid, bricks_.granularity);
@@ -90,19 +103,7 @@ void ClassifyBricks::classify_band(const DeviceField& base, const NodeTolerance&
                                    const std::vector<std::uint8_t>& near) {
   std::vector<std::uint8_t> refined = near;
   if (coarse_) {
-    std::vector<std::uint8_t> undecided(near.size(), 0);
-    test(*coarse_, base, tolerance, near, "screen", [&](const BrickLevels& l) {
-      const std::size_t id = at(l.base.brick);
-      coarse_slack_[id] = l.base.slack;
-      const Verdict verdict = coarse_verdict(l.base, tolerance.of(id));
-      if (verdict != Verdict::beyond) refined[id] = 0;
-      if (verdict == Verdict::undecided) undecided[id] = 1;
-      if (verdict == Verdict::within) take(l, true);
-    });
-    test(fine_, base, tolerance, undecided, "screen", [&](const BrickLevels& l) {
-      if (passes(l.base, tolerance.of(at(l.base.brick)))) take(l, true);
-      else refined[at(l.base.brick)] = 1;
-    });
+    screen(base, tolerance, near, refined);
     std::vector<std::uint8_t> easy = refined, hard = refined;
     for (std::size_t i = 0; i < easy.size(); ++i) {
       easy[i] = refined[i] && is_easy(i, tolerance.of(i));
@@ -114,6 +115,29 @@ void ClassifyBricks::classify_band(const DeviceField& base, const NodeTolerance&
       if (is_above_base(bricks_.level[i])) refined[i] = 0;
   }
   refine(fine_, base, tolerance, refined, GoldStream::For::samples);
+}
+
+// Level 0: what each rate leaves undecided, the next one tests. Those that none passes stay in `refined`.
+void ClassifyBricks::screen(const DeviceField& base, const NodeTolerance& tolerance,
+                            const std::vector<std::uint8_t>& near, std::vector<std::uint8_t>& refined) {
+  std::vector<JournalledGold*> finer{&*coarse_, &fine_};
+  for (JournalledGold& gold : sharper_) finer.push_back(&gold);
+  std::vector<std::uint8_t> open = near;
+  std::vector<BrickMeasure> fine(near.size());
+  for (JournalledGold* gold : finer) {
+    std::vector<std::uint8_t> undecided(near.size(), 0);
+    test(*gold, base, tolerance, open, "screen", [&](BrickLevels l) {
+      const std::size_t id = at(l.base.brick);
+      if (gold == &*coarse_) coarse_slack_[id] = l.base.slack;
+      else l.base = fine[id] = gold == &fine_ ? l.base : sharper_of(fine[id], l.base);
+      const Verdict verdict = verdict_of(l.base, tolerance.of(id));
+      undecided[id] = verdict == Verdict::undecided;
+      if (verdict != Verdict::within) return;
+      refined[id] = 0;
+      take(l, true);
+    });
+    open = std::move(undecided);
+  }
 }
 
 // Level 0 only.
@@ -241,16 +265,26 @@ void ClassifyBricks::measure_band(const DeviceField& field, const std::vector<Le
     for (std::size_t i = 0; i < easy.size(); ++i)
       easy[i] = easy[i] && resolves(coarse_->gold(), stored.at(i)) && is_easy(i, tolerance.of(i));
     measure_at(*coarse_, field, tolerance, easy, stage, [&](const BrickMeasure& m) {
-      if (coarse_verdict(m, tolerance.of(at(m.brick))) != Verdict::within) return;
+      if (verdict_of(m, tolerance.of(at(m.brick))) != Verdict::within) return;
       measures_.at(at(m.brick)) = m;
       take_slack(m);
       rest[at(m.brick)] = 0;
     });
   }
-  measure_at(fine_, field, tolerance, rest, stage, [&](const BrickMeasure& m) {
-    measures_.at(at(m.brick)) = m;
-    take_slack(m);
-  });
+  std::vector<JournalledGold*> finer{&fine_};
+  for (JournalledGold& gold : sharper_) finer.push_back(&gold);
+  for (JournalledGold* gold : finer) {
+    std::vector<std::uint8_t> undecided(pending.size(), 0);
+    measure_at(*gold, field, tolerance, rest, stage, [&](const BrickMeasure& m) {
+      BrickMeasure& known = measures_.at(at(m.brick));
+      known = gold == &fine_ ? m : sharper_of(known, m);
+      const bool decides =
+          gold == finer.back() || verdict_of(m, tolerance.of(at(m.brick))) != Verdict::undecided;
+      if (decides) take_slack(m);
+      else undecided[at(m.brick)] = 1;
+    });
+    rest = std::move(undecided);
+  }
 }
 
 void ClassifyBricks::sharpen(const DeviceField& field, const NodeTolerance& tolerance) {
@@ -260,7 +294,7 @@ void ClassifyBricks::sharpen(const DeviceField& field, const NodeTolerance& tole
     float error = 0;
     std::vector<std::size_t> loose;
     for (std::size_t i = 0; i < measures_.size(); ++i)
-      if (measures_[i].rate == rate) error = std::max(error, measures_[i].error);
+      if (measures_[i].rate >= rate) error = std::max(error, measures_[i].error);
     for (std::size_t i = 0; i < measures_.size(); ++i)
       if (measures_[i].rate < rate && measures_[i].total > error) loose.push_back(i);
     if (loose.empty()) return;

@@ -1,4 +1,4 @@
-// Levels of bricks by the node test, and the measure of stored fields, at two rates of gold
+// Levels of bricks by the node test, and the measure of stored fields, at several rates of gold
 // (docs/error-bounds.md, section 14).
 #pragma once
 
@@ -18,9 +18,8 @@
 namespace vdvr {
 
 enum class Verdict { within, beyond, undecided };
-/// Of a field measured on coarse gold. Beyond: at one of its nodes, which are nodes of the fine gold too.
-/// Within leaves room for the fine test, which counts a node's error and slack anew, to agree.
-Verdict coarse_verdict(const BrickMeasure& m, double tolerance);
+/// Of a field measured at one rate of gold. Beyond: at one of its nodes, which are nodes of finer gold too.
+Verdict verdict_of(const BrickMeasure& m, double tolerance);
 
 class ClassifyBricks {
  public:
@@ -68,6 +67,8 @@ class ClassifyBricks {
   void for_each_band(const std::vector<std::uint8_t>& selected, const Work& work);
   void classify_band(const DeviceField& base, const NodeTolerance& tolerance,
                      const std::vector<std::uint8_t>& near);
+  void screen(const DeviceField& base, const NodeTolerance& tolerance, const std::vector<std::uint8_t>& near,
+              std::vector<std::uint8_t>& refined);
   void measure_band(const DeviceField& field, const std::vector<LevelTriple>& stored,
                     const NodeTolerance& tolerance, const std::vector<std::uint8_t>& pending,
                     const std::string& stage);
@@ -87,6 +88,7 @@ class ClassifyBricks {
   HostMemory& host_;
   JournalledGold& fine_;
   std::optional<JournalledGold>& coarse_;
+  std::vector<JournalledGold>& sharper_;
   Progress progress_, whole_progress_;  // of a band, of all
   Refuse refuse_;
   std::vector<BrickMeasure> measures_;

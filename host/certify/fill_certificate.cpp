@@ -28,14 +28,13 @@ void name_kinds(const Crew& crew, Certificate& c) {
 // tested for its neighbours' sake alone, which computed by itself it does not show: then the brick's first
 // node.
 Vec3 position_of(const Inputs& in, const MixedVolume& volume, const BrickMeasure& worst) {
-  GoldStream& fine = in.gold.fine.gold();
-  GoldStream& gold = in.gold.coarse && worst.rate != fine.settings().rate ? in.gold.coarse->gold() : fine;
   std::vector<std::uint8_t> one(in.selected.size(), 0);
   one[at(worst.brick)] = 1;
   std::optional<Vec3> where;
-  gold.run(
-      one, [&](GoldStream::Batch& batch) { where = worst_node(batch, volume, worst.brick, worst.rate); }, {},
-      "worst");
+  in.rates.of(worst.rate)
+      .run(
+          one, [&](GoldStream::Batch& batch) { where = worst_node(batch, volume, worst.brick, worst.rate); },
+          {}, "worst");
   if (where) return *where;
   const Bricks bricks(volume.grid, volume.granularity);
   return volume.grid.position(bricks.first_cell(bricks.position(worst.brick)));

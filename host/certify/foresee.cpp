@@ -59,9 +59,9 @@ int stratum_of(double error, double tolerance) {
       std::clamp(std::round(2 * std::log2(std::max(error / tolerance, 1e-9))), -8.0, 16.0));
 }
 
-// What becomes of a brick: level 0 by coarse gold or by fine, a tile from coarse gold (measured on it or on
-// fine gold) or from fine.
-enum Fate { coarse_stays, fine_stays, coarse_refined, proposed, fine_refined, fates };
+// What becomes of a brick: level 0 by coarse gold, by fine or by finer, a tile from coarse gold (measured on
+// it or on fine gold) or from fine.
+enum Fate { coarse_stays, fine_stays, finer_stays, coarse_refined, proposed, fine_refined, fates };
 
 struct Stratum {
   std::vector<std::int64_t> bricks, candidates;  // all, and those in the layers looked at
@@ -104,28 +104,28 @@ class Paces {
   explicit Paces(GoldRates& gold) : gold_(gold) { reset(); }
   // What was done before does not count.
   void reset() {
-    for (const bool fine : {false, true})
+    const auto note = [&](const GoldStream& s) {
       for (const auto purpose :
            {GoldStream::For::samples, GoldStream::For::measuring, GoldStream::For::proposing})
-        if (GoldStream* s = stream(fine)) before_[{fine, purpose}] = s->spent(purpose);
+        before_[{s.settings().rate, purpose}] = s.spent(purpose);
+    };
+    note(gold_.fine());
+    if (gold_.coarse()) note(*gold_.coarse());
+    for (const GoldStream& s : gold_.sharper()) note(s);
   }
-  double seconds(bool fine, GoldStream::For purpose, const std::vector<std::uint8_t>& bricks) {
-    GoldStream* s = stream(fine);
-    return s ? pace(fine, purpose) * s->samples(bricks, purpose) : 0;
+  double seconds(GoldStream& s, GoldStream::For purpose, const std::vector<std::uint8_t>& bricks) {
+    return pace(s, purpose) * s.samples(bricks, purpose);
   }
   /// Seconds a sample.
-  double pace(bool fine, GoldStream::For purpose) {
-    GoldStream* s = stream(fine);
-    if (!s) return 0;
-    GoldSpent spent = s->spent(purpose);
-    spent -= before_[{fine, purpose}];
+  double pace(const GoldStream& s, GoldStream::For purpose) {
+    GoldSpent spent = s.spent(purpose);
+    spent -= before_[{s.settings().rate, purpose}];
     return spent.seconds / std::max(1.0, spent.samples);
   }
 
  private:
-  GoldStream* stream(bool fine) { return fine ? &gold_.fine() : gold_.coarse(); }
   GoldRates& gold_;
-  std::map<std::pair<bool, GoldStream::For>, GoldSpent> before_;
+  std::map<std::pair<int, GoldStream::For>, GoldSpent> before_;
 };
 
 // The strata of the bricks, and which of them to look at.
@@ -202,9 +202,9 @@ struct Foresight::Classified {
   bool easy = false;  // measured on coarse gold first
 
   [[nodiscard]] Fate fate(int fine_rate) const {
-    const bool fine = measure.rate == fine_rate;
+    const bool fine = measure.rate >= fine_rate;
     if (samples > 0) return fine ? fine_refined : easy ? coarse_refined : proposed;
-    return fine ? fine_stays : coarse_stays;
+    return measure.rate > fine_rate ? finer_stays : fine ? fine_stays : coarse_stays;
   }
 };
 
@@ -260,7 +260,7 @@ double Foresight::first_pass_seconds(const NodeTolerance& tolerance) {
   const auto purpose = screens ? GoldStream::For::measuring : GoldStream::For::samples;
   Paces large(gold_);
   classify(tolerance, some_blocks(first, Bricks(settings.grid, settings.granularity).along(), looked_at_));
-  return large.seconds(!screens, purpose, near_);
+  return large.seconds(first, purpose, near_);
 }
 
 Foreseen Foresight::foresee(const NodeTolerance& tolerance) {
@@ -286,8 +286,8 @@ Foreseen Foresight::foresee(const NodeTolerance& tolerance) {
       if (c.measure.total >= 0) s.share[c.fate(settings.rate)] += 1;
     }
 
-  tile_pace_ = small.pace(true, GoldStream::For::samples);
-  measure_pace_ = small.pace(true, GoldStream::For::measuring);
+  tile_pace_ = small.pace(gold_.fine(), GoldStream::For::samples);
+  measure_pace_ = small.pace(gold_.fine(), GoldStream::For::measuring);
 
   // A stratum without a brick in the layers takes after the one below it.
   double tile_samples = 0, mean = 0;
@@ -301,7 +301,7 @@ Foreseen Foresight::foresee(const NodeTolerance& tolerance) {
     }
     tile_samples += mean * static_cast<double>(s.bricks.size());
     std::size_t next = 0;
-    for (const Fate fate : {fine_refined, proposed, coarse_refined, fine_stays})
+    for (const Fate fate : {fine_refined, proposed, coarse_refined, finer_stays, fine_stays})
       for (double i = 0; i < share[fate] * static_cast<double>(s.bricks.size()) && next < s.bricks.size();
            ++i)
         bricks[fate][at(s.bricks[next++])] = 1;
@@ -319,21 +319,23 @@ Foreseen Foresight::foresee(const NodeTolerance& tolerance) {
                      kept.tile_seconds() / static_cast<double>(std::max<std::int64_t>(1, kept.tiles())) *
                          static_cast<double>(kept.tiles() + missing);
   out.seconds = first_pass + out.kept_seconds;
-  const auto add = [&](bool fine, GoldStream::For purpose, const std::vector<std::uint8_t>& of) {
-    out.seconds += small.seconds(fine, purpose, of);
+  const auto add = [&](GoldStream& gold, GoldStream::For purpose, const std::vector<std::uint8_t>& of) {
+    out.seconds += small.seconds(gold, purpose, of);
   };
   using For = GoldStream::For;
   std::vector<std::uint8_t> hard = bricks[proposed];
   for (std::size_t i = 0; i < hard.size(); ++i) hard[i] = hard[i] || bricks[fine_refined][i];
   if (screens) {
-    add(true, For::measuring, bricks[fine_stays]);
-    add(false, For::samples, bricks[coarse_refined]);
-    add(false, For::proposing, hard);
-    add(true, For::samples, bricks[fine_refined]);
+    GoldStream& coarse = *gold_.coarse();
+    for (const Fate stays : {fine_stays, finer_stays}) add(gold_.fine(), For::measuring, bricks[stays]);
+    if (!gold_.sharper().empty()) add(gold_.sharper().front(), For::measuring, bricks[finer_stays]);
+    add(coarse, For::samples, bricks[coarse_refined]);
+    add(coarse, For::proposing, hard);
+    add(gold_.fine(), For::samples, bricks[fine_refined]);
+    // Verification.
+    add(coarse, For::measuring, bricks[coarse_refined]);
   }
-  // Verification.
-  add(false, For::measuring, bricks[coarse_refined]);
-  add(true, For::measuring, hard);
+  add(gold_.fine(), For::measuring, hard);
   return out;
 }
 

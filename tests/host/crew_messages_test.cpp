@@ -51,6 +51,7 @@ BOOST_AUTO_TEST_CASE(settings_and_passes_come_back) {
   BlockPass p;
   p.ask = BlockPass::Ask::extract;
   p.fine = false;
+  p.rate = 32;
   p.purpose = GoldStream::For::proposing;
   p.number = 9;
   p.tolerance = NodeTolerance(0.1, {0.5F, 0.25F});
@@ -58,7 +59,7 @@ BOOST_AUTO_TEST_CASE(settings_and_passes_come_back) {
   p.selected = {1, 0, 1};
   p.level = {{1, 2, 3}};
   const BlockPass q = again(p);
-  BOOST_TEST((q.ask == p.ask && !q.fine && q.purpose == p.purpose && q.number == 9));
+  BOOST_TEST((q.ask == p.ask && !q.fine && q.rate == 32 && q.purpose == p.purpose && q.number == 9));
   BOOST_TEST((q.tolerance.of_all == 0.1 && q.tolerance.by_brick == p.tolerance.by_brick));
   BOOST_TEST((q.lattice.least == SampleType::u8 && q.selected == p.selected && q.level == p.level));
 }

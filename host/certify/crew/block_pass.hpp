@@ -24,7 +24,8 @@ struct BlockPass {
     remainder  ///< what T leaves out (brick_remainder.hpp)
   };
   Ask ask = Ask::test;
-  bool fine = true;  ///< gold at the rate that certifies, else at half of it
+  bool fine = true;  ///< gold at the rate of the plan or a finer one, which any level suits
+  int rate = 0;      ///< of the gold, but for `fit`
   GoldStream::For purpose = GoldStream::For::measuring;
   std::int64_t number = 0;  ///< of the passes at this rate
   NodeTolerance tolerance = 0.0;

@@ -417,6 +417,7 @@ void Crew::look_at(GoldStream& gold, const std::vector<std::uint8_t>& selected, 
   if (open.empty()) return;
   BlockPass pass;
   pass.ask = BlockPass::Ask::remainder;
+  pass.rate = gold.settings().rate;
   pass.lattice = gold.settings().lattice;
   pass.selected = selected;
   const auto shared = std::make_shared<const BlockPass>(std::move(pass));

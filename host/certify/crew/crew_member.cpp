@@ -1,6 +1,5 @@
 #include "host/certify/crew/crew_member.hpp"
 
-#include <stdexcept>
 #include <utility>
 
 namespace vdvr {
@@ -58,10 +57,7 @@ GoldStream& CrewMember::stream() {
     if (!fitting_) fitting_.emplace(state_, scan_, sups_, fitting_settings(settings_), source());
     return *fitting_;
   }
-  GoldRates& both = rates(pass_->lattice);
-  if (pass_->fine) return both.fine();
-  if (!both.coarse()) throw std::logic_error("CrewMember: a pass of coarse gold, where there is none");
-  return *both.coarse();
+  return rates(pass_->lattice).of(pass_->rate);
 }
 
 double CrewMember::arithmetic() { return GoldRates(state_, scan_, sups_, settings_, source()).arithmetic(); }

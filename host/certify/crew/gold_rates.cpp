@@ -1,9 +1,19 @@
 #include "host/certify/crew/gold_rates.hpp"
 
+#include <algorithm>
+#include <array>
+#include <stdexcept>
 #include <utility>
+
+#include "host/certify/kept/gold_filters.hpp"
 
 namespace vdvr {
 namespace {
+
+// A second finer one leaves a sixteenth of T. What a third would spare does not pay for it.
+constexpr int most_sharper = 1;
+// Cell coordinates of nodes are exact in fp32.
+constexpr std::int64_t most_nodes_across = 1 << 24;
 
 GoldSettings with_coarse(GoldSettings settings) {
   if (settings.rate >= 4 && !settings.grid_only && !settings.window) settings.coarse_rate = settings.rate / 2;
@@ -17,8 +27,28 @@ GoldRates::GoldRates(opencl::State& state, const FilteredScan& scan, const Field
   settings = with_coarse(settings);
   fine_.emplace(state, scan, sups, settings, std::move(source));
   if (settings.coarse_rate == 0) return;
-  settings.finer_rate = std::exchange(settings.rate, std::exchange(settings.coarse_rate, 0));
-  coarse_.emplace(state, scan, sups, settings, fine_->source());
+  GoldSettings coarse = settings;
+  coarse.finer_rate = std::exchange(coarse.rate, std::exchange(coarse.coarse_rate, 0));
+  const auto cells = *std::max_element(settings.grid.cells.begin(), settings.grid.cells.end());
+  settings.coarse_rate = 0;
+  for (int i = 0; i < most_sharper; ++i) {
+    settings.rate *= 2;
+    const std::array<int, 3> phases = fine_->source()->kept.lattice(settings.grid, settings.rate).phases;
+    if (cells * settings.rate > most_nodes_across ||
+        *std::max_element(phases.begin(), phases.end()) > most_gold_phases)
+      break;
+    sharper_.emplace_back(state, scan, sups, settings, fine_->source());
+    coarse.finer_rate = settings.rate;
+  }
+  coarse_.emplace(state, scan, sups, coarse, fine_->source());
+}
+
+GoldStream& GoldRates::of(int rate) {
+  if (fine_->settings().rate == rate) return *fine_;
+  if (coarse_ && coarse_->settings().rate == rate) return *coarse_;
+  for (GoldStream& gold : sharper_)
+    if (gold.settings().rate == rate) return gold;
+  throw std::logic_error("GoldRates: gold of a rate that there is none of");
 }
 
 }  // namespace vdvr

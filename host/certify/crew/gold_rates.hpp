@@ -1,7 +1,8 @@
-// Gold at the rate that certifies, and at half of it (docs/error-bounds.md, section 14).
+// Gold at the rate that certifies, at half of it, and at finer ones (docs/error-bounds.md, section 14).
 #pragma once
 
 #include <algorithm>
+#include <deque>
 #include <memory>
 #include <optional>
 
@@ -9,8 +10,10 @@
 
 namespace vdvr {
 
-/// Gold at the rate that certifies, and at half of it where that can decide something: a stored field that is
-/// within the tolerance by the coarse test is so by the theorem of that rate, for an eighth of the work.
+/// Gold at several rates, each of which bounds |V - F| by the theorem of its own. The coarse one decides most
+/// bricks for an eighth of the work. What it leaves undecided the fine one tests, at the rate of the plan;
+/// the few bricks that differ from gold by less than the tolerance, but not by as much less as T takes, are
+/// tested at finer rates, whose T is a quarter and a sixteenth.
 class GoldRates {
  public:
   GoldRates(opencl::State& state, const FilteredScan& scan, const FieldSups& sups, GoldSettings settings,
@@ -19,20 +22,30 @@ class GoldRates {
   [[nodiscard]] const GoldStream& fine() const { return *fine_; }
   /// None where rate < 4, where slack does not count or where a window is given.
   [[nodiscard]] GoldStream* coarse() { return coarse_ ? &*coarse_ : nullptr; }
-  /// Of the largest block of either.
+  /// Ascending; none where there is no coarse one.
+  [[nodiscard]] std::deque<GoldStream>& sharper() { return sharper_; }
+  /// Of one of its rates; throws std::logic_error where it is none.
+  [[nodiscard]] GoldStream& of(int rate);
+  /// Of the largest block of any.
   [[nodiscard]] Index3 block_bricks() const { return (coarse_ ? *coarse_ : *fine_).block_bricks(); }
 
-  /// fp32 error bound of any gold sample of either rate: positions in blocks of coarse gold reach farther.
+  /// fp32 error bound of any gold sample of any rate: positions in blocks of coarse gold reach farther.
   [[nodiscard]] double arithmetic() const {
-    return std::max(fine_->arithmetic(), coarse_ ? coarse_->arithmetic() : 0.0);
+    return largest([](const GoldStream& gold) { return gold.arithmetic(); });
   }
-  /// P of either rate.
+  /// P of any rate.
   [[nodiscard]] double projection() const {
-    return std::max(fine_->projection(), coarse_ ? coarse_->projection() : 0.0);
+    return largest([](const GoldStream& gold) { return gold.projection(); });
   }
 
  private:
+  [[nodiscard]] double largest(const auto& of) const {
+    double out = std::max(of(*fine_), coarse_ ? of(*coarse_) : 0.0);
+    for (const GoldStream& gold : sharper_) out = std::max(out, of(gold));
+    return out;
+  }
   std::optional<GoldStream> fine_, coarse_;
+  std::deque<GoldStream> sharper_;
 };
 
 }  // namespace vdvr

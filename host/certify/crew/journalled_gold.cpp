@@ -65,6 +65,7 @@ void JournalledGold::run(BlockPass pass, const DeviceField* field,
                          const std::string& stage) {
   pass.number = passes_++;
   pass.fine = fine_;
+  pass.rate = gold_.settings().rate;
   pass.lattice = gold_.settings().lattice;
   if (std::find(pass.selected.begin(), pass.selected.end(), 1) == pass.selected.end()) return;
   const auto shared = std::make_shared<const BlockPass>(std::move(pass));

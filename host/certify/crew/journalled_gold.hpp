@@ -73,9 +73,11 @@ struct JournalledRates {
   explicit JournalledRates(GoldRates& gold, BlockRecords* records = nullptr, Crew* crew = nullptr)
       : fine(gold.fine(), true, records, crew) {
     if (GoldStream* stream = gold.coarse()) coarse.emplace(*stream, false, records, crew);
+    for (GoldStream& stream : gold.sharper()) sharper.emplace_back(stream, true, records, crew);
   }
   JournalledGold fine;
   std::optional<JournalledGold> coarse;
+  std::vector<JournalledGold> sharper;
 };
 
 }  // namespace vdvr

@@ -17,7 +17,7 @@ namespace vdvr {
 namespace {
 
 void check(int rate, double band, int taps) {
-  if (rate < 1 || rate > 32 || (rate & (rate - 1)) != 0)
+  if (rate < 1 || rate > most_gold_phases || (rate & (rate - 1)) != 0)
     throw InputError(fmt::format("a filter of rate {}: it must be 1, 2, 4, 8, 16 or 32", rate));
   if (!(band > 0) || band > highest_gold_band)
     throw InputError(fmt::format("a filter for the band {}: it must be above 0, at most 3/4 pi", band));

@@ -9,6 +9,8 @@ namespace vdvr {
 
 /// Radians a node: filters are designed for no more.
 inline constexpr double highest_gold_band = 0.75 * std::numbers::pi;
+/// Positions between two nodes.
+inline constexpr int most_gold_phases = 32;
 
 /// One filter of `taps` weights for each position phase / rate between two nodes: the value there is
 ///   sum_i weights[phase * taps + i] f(first() + i),  nodes counted from the node on the left.

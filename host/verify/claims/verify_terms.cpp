@@ -125,12 +125,12 @@ class Totals {
         field_(f.state, v),
         gold_(f.state, f.scan, f.sups, settings(f, v, c)),
         same_device_(same_device) {
-    for (GoldStream* gold : {&gold_.fine(), gold_.coarse()}) {
-      if (!gold) continue;
+    for (const GoldStream* gold : rates()) {
       const GoldLattice lattice = kept().lattice(v.grid, gold->settings().rate);
       const double ramp = kept().errors(lattice).ramp;
       const auto [least, most] = kept().rounding_elsewhere(lattice, same_device);
-      least_arithmetic_ = std::max(least_arithmetic_, least + ramp);
+      // Earlier versions knew no finer rates than the plan's.
+      if (gold->settings().rate <= v.rate) least_arithmetic_ = std::max(least_arithmetic_, least + ramp);
       most_arithmetic_ = std::max(most_arithmetic_, most + ramp);
     }
     for (const float b : decoded(v.base, v.step))
@@ -143,7 +143,7 @@ class Totals {
                const Progress& progress) {
     const std::vector<std::uint8_t> near = gold_.fine().bricks_near_coverage();
     for (std::size_t i = 0; i < selected.size(); ++i) selected[i] = selected[i] && near[i];
-    // A brick has its total from either rate of gold: the coarse one explains most, for an eighth of the
+    // A brick has its total from one rate of gold: the coarse one explains most, for an eighth of the
     // work.
     if (GoldStream* coarse = gold_.coarse()) {
       std::vector<std::uint8_t> resolved = selected;
@@ -156,19 +156,38 @@ class Totals {
       });
     }
     std::vector<BrickMeasure> low;
-    run(gold_.fine(), selected, progress, [&](const BrickMeasure& m) {
-      if (m.total >= 0) {
-        error_ = std::max(error_, static_cast<double>(m.error));
-        most_ = std::max(most_, static_cast<double>(m.error) + arithmetic() + arithmetic_of_build());
-      }
-      if (!agrees(m)) low.push_back(m);
-    });
+    const auto measure = [&](GoldStream& gold) {
+      run(gold, selected, progress, [&](const BrickMeasure& m) {
+        if (m.total >= 0) {
+          if (&gold == &gold_.fine()) error_ = std::max(error_, static_cast<double>(m.error));
+          most_ = std::max(most_, static_cast<double>(m.error) + arithmetic() + arithmetic_of_build());
+        }
+        if (!agrees(m)) low.push_back(m);
+        // Finer gold may have decided it for less than rounding, and seen another largest error.
+        else if (is_below(m)) most_ = std::max(most_, static_cast<double>(m.total));
+      });
+    };
+    measure(gold_.fine());
+    // Build took finer gold where that left a brick undecided.
+    for (GoldStream& gold : gold_.sharper()) {
+      selected.assign(selected.size(), 0);
+      for (const BrickMeasure& m : std::exchange(low, {})) selected[at(m.brick)] = 1;
+      measure(gold);
+    }
     compare_alone(out, std::move(low), progress);
     compare_constants(out);
     compare_largest(out, exhaustive);
   }
 
  private:
+  // Those at which build can have decided a brick.
+  std::vector<GoldStream*> rates() {
+    std::vector<GoldStream*> out{&gold_.fine()};
+    if (gold_.coarse()) out.push_back(gold_.coarse());
+    for (GoldStream& gold : gold_.sharper()) out.push_back(&gold);
+    return out;
+  }
+
   static GoldSettings settings(const Filtered& f, const MixedVolume& v, const Certificate& c) {
     GoldSettings s{v.grid, v.granularity, v.rate, c.rates.upsampling, c.rates.interpolation, c.window};
     s.coarsening = v.coarsening;
@@ -199,7 +218,7 @@ class Totals {
   }
 
   // A node takes T and P from the cells around it in its block, and blocks are cut to the bricks asked for:
-  // of a brick alone the total is the least that build can have found, by one rate of gold or the other.
+  // of a brick alone the total is the least that build can have found, by one rate of gold or another.
   void compare_alone(Differences& out, std::vector<BrickMeasure> low, const Progress& progress) {
     const auto deficit = [&](const BrickMeasure& m) {
       return static_cast<double>(m.total) - static_cast<double>(stored_.brick_totals[at(m.brick)]);
@@ -212,8 +231,8 @@ class Totals {
       std::vector<std::uint8_t> one(volume_.level.size(), 0);
       one[at(low[i].brick)] = 1;
       bool right = false;
-      for (GoldStream* gold : {&gold_.fine(), gold_.coarse()})
-        if (gold && !right && (gold == &gold_.fine() || resolves(*gold, at(low[i].brick))))
+      for (GoldStream* gold : rates())
+        if (!right && resolves(*gold, at(low[i].brick)))
           run(*gold, one, progress, [&](const BrickMeasure& m) { right = agrees(m); });
       if (right) continue;
       if (++different == 1)
@@ -248,6 +267,10 @@ class Totals {
     const auto stored = static_cast<double>(stored_.brick_totals[at(m.brick)]);
     if (m.total < 0) return true;
     return stored >= 0 && stored >= static_cast<double>(m.total) - tolerance(m);
+  }
+
+  [[nodiscard]] bool is_below(const BrickMeasure& m) const {
+    return !stored_.brick_totals.empty() && stored_.brick_totals[at(m.brick)] < m.total;
   }
 
   // What follows from sups alone. The filter's own error is measured, and another device's may be smaller.
