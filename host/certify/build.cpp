@@ -322,11 +322,12 @@ void count_inputs(HostMemory& host, const ProjectionSet& scan, const Plan& plan)
 }
 
 // The scan filtered, gold at the plan's rates, then the volume: once, or again where the base rounds too
-// much. All but the scan, and what is thrown, in `units`.
-BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Units& units, Plan plan,
-                           const BuildOptions& options, const std::optional<BuildShare>& share,
-                           const Progress& progress) {
+// much. All but the scan, and what is thrown, in its units.
+BuildResult build_in_units(Device& device, const ScanInUnits& of_scan, Plan plan, const BuildOptions& options,
+                           const std::optional<BuildShare>& share, const Progress& progress) {
   opencl::State& state = device.state();
+  const ProjectionSet& scan = of_scan.scan;
+  const Units& units = of_scan.units;
   require_trusted(device, "certifying a volume");
   BuildResult result;
   Stopwatch watch(result.seconds);
@@ -337,10 +338,10 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
     throw InputError("`roi` meets no brick of the grid");
 
   // Six taps need values alone.
-  const bool prepared = plan.prepared && plan.prepared->is_of(state, scan, plan.field, units);
+  const bool prepared = plan.prepared && plan.prepared->is_of(state, of_scan, plan.field);
   const auto from = prepared
                         ? plan.prepared
-                        : std::make_shared<PreparedScan>(state, scan, plan.field, units,
+                        : std::make_shared<PreparedScan>(state, of_scan, plan.field,
                                                          plan.rates.interpolation == Interpolation::six_taps
                                                              ? PreparedScan::Sups::of_values
                                                              : PreparedScan::Sups::of_derivatives,
@@ -437,18 +438,17 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
 BuildResult build_all_or_share(Device& device, const ProjectionSet& scan, Plan plan,
                                const BuildOptions& options, const std::optional<BuildShare>& share,
                                const Progress& progress) {
-  check_line_integrals(scan);
+  const ScanInUnits of_scan(scan);
   if (plan.estimated) throw InputError("a plan that was estimated from a part of the scan cannot be built");
-  const Units units = units_of(scan);
-  if (units.are_world())
-    return build_in_units(device, scan, units, std::move(plan), options, share, progress);
+  const Units& units = of_scan.units;
+  if (units.are_world()) return build_in_units(device, of_scan, std::move(plan), options, share, progress);
   const Grid grid = plan.grid;
   BuildOptions wanted = options;
   if (options.roi) wanted.roi = from_world(*options.roi, units);
   if (options.window)
     wanted.window = {from_world(options.window->first, units), from_world(options.window->second, units)};
   BuildResult result =
-      build_in_units(device, scan, units, from_world(std::move(plan), units), wanted, share, progress);
+      build_in_units(device, of_scan, from_world(std::move(plan), units), wanted, share, progress);
   if (share) return result;
   scale(result.volume, units.density());
   result.volume.grid = grid;

@@ -208,10 +208,9 @@ struct Foresight::Classified {
   }
 };
 
-Foresight::Foresight(std::shared_ptr<PreparedScan> prepared, const Units& units, const GoldSettings& settings,
-                     const Volume& base, std::vector<float> stored, std::vector<std::uint8_t> looked_at)
+Foresight::Foresight(std::shared_ptr<PreparedScan> prepared, const GoldSettings& settings, const Volume& base,
+                     std::vector<float> stored, std::vector<std::uint8_t> looked_at)
     : prepared_(std::move(prepared)),
-      units_(units),
       gold_(prepared_->state, prepared_->filtered, prepared_->sups, settings, prepared_->source(settings)),
       stored_(std::move(stored)),
       looked_at_(std::move(looked_at)),

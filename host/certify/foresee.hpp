@@ -22,13 +22,13 @@ struct Foreseen {
 /// the lowest to the highest, at places that stand for equal areas of the covered disc.
 std::vector<std::uint8_t> bricks_to_look_at(GoldStream& stream, const ParallelGeometry& geometry);
 
-/// Of what plans look at, foresees builds of different tolerances. Keeps the prepared scan; all but what
-/// `units` says is in those.
+/// Of what plans look at, foresees builds of different tolerances. Keeps the prepared scan, and is in its
+/// units.
 class Foresight {
  public:
   /// `base` holds F on the grid, `stored` the base samples to store.
-  Foresight(std::shared_ptr<PreparedScan> prepared, const Units& units, const GoldSettings& settings,
-            const Volume& base, std::vector<float> stored, std::vector<std::uint8_t> looked_at);
+  Foresight(std::shared_ptr<PreparedScan> prepared, const GoldSettings& settings, const Volume& base,
+            std::vector<float> stored, std::vector<std::uint8_t> looked_at);
 
   /// Classifies a few whole blocks, which tells the time, and some bricks of every stratum of expected error,
   /// which tells the storage, among those to look at. `tolerance` is what the node test may take. Raising
@@ -39,7 +39,7 @@ class Foresight {
   /// their measure, at the pace of what was foreseen last.
   double repair_seconds(const std::vector<std::uint8_t>& raises);
 
-  [[nodiscard]] const Units& units() const { return units_; }
+  [[nodiscard]] const Units& units() const { return prepared_->units; }
   [[nodiscard]] GoldRates& gold() { return gold_; }
   /// Of the base samples, on the bricks that were looked at last.
   [[nodiscard]] const std::vector<BrickMeasure>& measured() const { return measured_; }
@@ -53,7 +53,6 @@ class Foresight {
   double first_pass_seconds(const NodeTolerance& tolerance);
 
   std::shared_ptr<PreparedScan> prepared_;
-  Units units_;
   GoldRates gold_;
   std::vector<float> stored_;
   std::vector<std::uint8_t> looked_at_, near_;

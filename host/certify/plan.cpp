@@ -142,12 +142,13 @@ double seconds_of(const std::function<void()>& work) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-// One plan, step by step. All but the scan, and what is thrown, in `units`.
+// One plan, step by step. All but the scan, and what is thrown, in its units.
 class Planner {
  public:
-  Planner(Device& device, const ProjectionSet& scan, const Units& units, const Grid& grid,
-          const FieldOptions& field, const PlanSettings& settings, const Progress& progress)
-      : device_(device), state_(device.state()), units_(units), progress_(progress), host_(state_) {
+  Planner(Device& device, const ScanInUnits& from, const Grid& grid, const FieldOptions& field,
+          const PlanSettings& settings, const Progress& progress)
+      : device_(device), state_(device.state()), units_(from.units), progress_(progress), host_(state_) {
+    const ProjectionSet& scan = from.scan;
     scan_bytes_ = scan.data.resident_bytes();
     host_.count(scan_bytes_, "the projections, as read,");
     host_.count(8 * static_cast<std::uint64_t>(grid.sample_count()), "the base samples");
@@ -162,7 +163,7 @@ class Planner {
     plan_.layout = {fitting_granularity(settings.granularity, grid), {}, settings.levels};
     report(progress_, "plan", 0.0);
     preparation_ = seconds_of([&] {
-      prepared_ = std::make_shared<PreparedScan>(state_, scan, field, units, sups_wanted(scan), Progress{});
+      prepared_ = std::make_shared<PreparedScan>(state_, from, field, sups_wanted(scan), Progress{});
     });
     coverage_.emplace(prepared_->filtered.geometry, prepared_->filtered.views);
   }
@@ -238,7 +239,7 @@ class Planner {
   }
 
   void look_at_reference() {
-    check_densities(to_world(largest_magnitude(plan_.base.samples), units_));
+    check_densities(largest_magnitude(plan_.base.samples), units_);
     const CoveredRange range = covered_range(plan_.base, *coverage_);
     plan_.not_covered_count = range.not_covered;
     plan_.not_covered_fraction =
@@ -321,7 +322,7 @@ class Planner {
                          stored, {}, source_at(plan_.rates));
     });
     const double all = size(gold.fine().bricks_near_coverage());
-    plan_.foresight = std::make_shared<Foresight>(prepared_, units_, settings_at(plan_.rates), plan_.base,
+    plan_.foresight = std::make_shared<Foresight>(prepared_, settings_at(plan_.rates), plan_.base,
                                                   std::move(stored), looked_at);
     const Foreseen foreseen = plan_.foresight->foresee(everywhere() - t.arithmetic);
     plan_.samples_ratio = foreseen.samples_ratio;
@@ -414,17 +415,16 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
   check_rates(rates);
   check_granularity(settings.granularity);
   check_tolerance(tolerance);
-  check_line_integrals(scan);
-  if (tolerance.relative && largest_magnitude(scan.data) == 0)
+  const ScanInUnits from(scan);
+  if (tolerance.relative && from.largest == 0)
     throw InputError(
         "every line integral is 0 in float32, so a relative tolerance means nothing; scale them, or give "
         "`epsilon_abs`");
-  const Units units = units_of(scan);
+  const Units& units = from.units;
   Tolerance wanted = tolerance;
   if (wanted.absolute) wanted.absolute = from_world(*wanted.absolute, units);
   Plan plan = to_world(
-      Planner(device, scan, units, from_world(grid, units), field, settings, progress).make(rates, wanted),
-      units);
+      Planner(device, from, from_world(grid, units), field, settings, progress).make(rates, wanted), units);
   plan.grid = plan.base.grid = grid;
   return plan;
 }

@@ -48,25 +48,24 @@ FieldSups sups_of(opencl::State& state, Upsampler& upsampler, const FilteredScan
 
 }  // namespace
 
-PreparedScan::PreparedScan(opencl::State& device, const ProjectionSet& scan, const FieldOptions& field,
-                           const Units& units, Sups wanted, const Progress& progress)
+PreparedScan::PreparedScan(opencl::State& device, const ScanInUnits& from, const FieldOptions& field,
+                           Sups wanted, const Progress& progress)
     : shared(device.shared_from_this()),
       state(device),
-      filtered(filter_scan(device, scan, field, progress, Precision::fp64, units)),
+      units(from.units),
+      filtered(filter_scan(device, from.scan, field, progress, Precision::fp64, units)),
       upsampler(device, filtered, ColumnMethod::accurate),
       sups(sups_of(device, upsampler, filtered, wanted)),
       host_(device),
       field_(field),
-      units_(units),
-      checksum_(checksum(scan)) {
+      checksum_(checksum(from.scan)) {
   host_.count(filtered.samples.resident_bytes(), "the projections, filtered,");
 }
 
-bool PreparedScan::is_of(const opencl::State& device, const ProjectionSet& scan, const FieldOptions& field,
-                         const Units& units) const {
+bool PreparedScan::is_of(const opencl::State& device, const ScanInUnits& from,
+                         const FieldOptions& field) const {
   return &device == &state && field.filter == field_.filter && field.cutoff == field_.cutoff &&
-         field.center == field_.center && units.across == units_.across && units.along == units_.along &&
-         units.line == units_.line && checksum(scan) == checksum_;
+         field.center == field_.center && from.units == units && checksum(from.scan) == checksum_;
 }
 
 std::shared_ptr<GoldSource> PreparedScan::source(const GoldSettings& s) {

@@ -21,19 +21,20 @@ struct PreparedScan {
   static constexpr std::int64_t estimate_views = 24;
 
   /// Filters and bounds. Keeps the state: a plan that has it may outlive its Device.
-  PreparedScan(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field, const Units& units,
-               Sups sups, const Progress& progress);
+  PreparedScan(opencl::State& state, const ScanInUnits& from, const FieldOptions& field, Sups sups,
+               const Progress& progress);
   PreparedScan(const PreparedScan&) = delete;
   PreparedScan& operator=(const PreparedScan&) = delete;
 
   /// Whether it is of this scan and field on this device.
-  [[nodiscard]] bool is_of(const opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
-                           const Units& units) const;
+  [[nodiscard]] bool is_of(const opencl::State& state, const ScanInUnits& from,
+                           const FieldOptions& field) const;
   /// What gold of these settings reads: rates that differ in gold alone share it.
   std::shared_ptr<GoldSource> source(const GoldSettings& settings);
 
   std::shared_ptr<opencl::State> shared;  ///< first: what follows counts its memory there to the last
   opencl::State& state;
+  const Units units;  ///< of all that follows
   FilteredScan filtered;
   Upsampler upsampler;
   FieldSups sups;
@@ -41,7 +42,6 @@ struct PreparedScan {
  private:
   HostMemory host_;
   FieldOptions field_;
-  Units units_;
   std::uint64_t checksum_ = 0;
   std::shared_ptr<GoldSource> source_;
   GoldSettings settings_;  // of source_

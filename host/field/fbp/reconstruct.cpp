@@ -166,9 +166,10 @@ Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Ups
   return volume.take();
 }
 
-void reconstruct_parallel(opencl::State& state, const ProjectionSet& scan, const Units& units,
-                          const Grid& grid, const ReconstructOptions& options, const Planes& planes,
-                          const Progress& progress, StageWatch& watch) {
+void reconstruct_parallel(opencl::State& state, const ScanInUnits& from, const Grid& grid,
+                          const ReconstructOptions& options, const Planes& planes, const Progress& progress,
+                          StageWatch& watch) {
+  const auto& [scan, largest, units] = from;
   // Without upsampling the filtered scan need not pass through the host. It does as soon as one slab needs
   // it.
   std::optional<DirectFilter> direct;

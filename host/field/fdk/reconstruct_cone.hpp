@@ -12,9 +12,9 @@
 
 namespace vdvr {
 
-/// The grid is in `units`. Cost: views * samples updates. Memory: a band of the volume and as many views as
-/// the rest of --max-memory holds.
-void reconstruct_cone(opencl::State& state, const ProjectionSet& scan, const Units& units, const Grid& grid,
+/// The grid is in the scan's units. Cost: views * samples updates. Memory: a band of the volume and as many
+/// views as the rest of --max-memory holds.
+void reconstruct_cone(opencl::State& state, const ScanInUnits& from, const Grid& grid,
                       const ReconstructOptions& options, const Planes& planes, const Progress& progress,
                       StageWatch& watch);
 
