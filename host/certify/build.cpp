@@ -19,7 +19,7 @@
 #include "host/certify/fill_certificate.hpp"
 #include "host/certify/gold/gold_batch.hpp"
 #include "host/certify/gold/prepared_scan.hpp"
-#include "host/certify/plan_units.hpp"
+#include "host/certify/plan_parts.hpp"
 #include "host/certify/sampler_share.hpp"
 #include "host/field/fbp/reconstruct.hpp"
 #include "host/volume/bricks.hpp"
@@ -92,24 +92,6 @@ MemoryBudget memory_budget_of(const opencl::State& state, const ProjectionSet& s
         std::make_shared<Scratch>(options.scratch.empty() ? default_scratch_folder() : options.scratch,
                                   std::max(share, least_resident));
   return budget;
-}
-
-GoldSettings gold_settings(const Plan& plan, const BuildOptions& options, const IntegerLattice& lattice,
-                           bool cone) {
-  const Comparison& comparison = plan.settings.comparison;
-  GoldSettings settings{plan.grid,
-                        plan.layout.granularity,
-                        plan.rates.gold,
-                        plan.rates.upsampling,
-                        plan.rates.interpolation,
-                        options.window};
-  settings.midrange = comparison.coefficients != Coefficients::sampled;
-  settings.anisotropic = plan.layout.levels == Levels::anisotropic && comparison.closing != Closing::paper;
-  settings.grid_only = comparison.terms == Terms::grid;
-  settings.coarsening = plan.layout.coarsening;
-  settings.lattice = lattice;
-  if (cone) settings.least_reach = reach_of_all(settings);
-  return settings;
 }
 
 OpenBricks open_bricks(const Plan& plan, const std::vector<float>& base, const IntegerLattice& lattice,
@@ -348,7 +330,10 @@ BuildResult build_in_units(Device& device, const ScanInUnits& of_scan, Plan plan
                                                          progress);
   const FilteredScan& filtered = from->filtered;
   watch.lap("filter");
-  GoldSettings settings = gold_settings(plan, options, {}, scan.cone.has_value());
+  GoldSettings settings = gold_settings(plan, plan.rates, scan.cone.has_value());
+  settings.window = options.window;
+  // That closing knows no levels per axis.
+  if (plan.settings.comparison.closing == Closing::paper) settings.anisotropic = false;
   std::optional<Crew> crew;
   const bool all = 2 * std::count(selected.begin(), selected.end(), 1) > std::ssize(selected);
   if (!options.crew.alone()) crew.emplace(device, *from, settings, options.crew, all);

@@ -114,7 +114,7 @@ Tightness measure_in_units(Device& device, const ScanInUnits& from, const Grid& 
   PreparedScan prepared(state, from, field, PreparedScan::Sups::of_derivatives, progress);
   const bool cone = from.scan.cone.has_value();
   const auto stream_at = [&](const Rates& r) {
-    const GoldSettings settings{grid, granularity, r.gold, r.upsampling, r.interpolation, {}};
+    const GoldSettings settings = gold_settings(grid, granularity, r);
     return GoldStream(state, prepared.filtered, prepared.sups, settings, prepared.source(settings));
   };
   // Of cone beam there is one way to gold.

@@ -22,7 +22,7 @@
 #include "host/certify/gold/base_of_gold.hpp"
 #include "host/certify/gold/gold_batch.hpp"
 #include "host/certify/gold/prepared_scan.hpp"
-#include "host/certify/plan_units.hpp"
+#include "host/certify/plan_parts.hpp"
 #include "host/field/fbp/reconstruct.hpp"
 #include "host/scan/row_window.hpp"
 #include "host/volume/bricks.hpp"
@@ -126,7 +126,7 @@ LevelTriple coarsening_of(const Plan& plan, const Coverage& coverage, const Gold
 // pass of gold.
 double largest_of_gold(opencl::State& state, const FilteredScan& filtered, const FieldSups& sups,
                        const Grid& grid, const Rates& r) {
-  GoldSettings settings{grid, fitting_granularity(4, grid), r.gold, r.upsampling, r.interpolation};
+  GoldSettings settings = gold_settings(grid, fitting_granularity(4, grid), r);
   settings.base_only = true;
   GoldStream stream(state, filtered, sups, settings);
   float largest = 0;
@@ -252,15 +252,7 @@ class Planner {
 
   [[nodiscard]] bool is_cone() const { return !prepared_->filtered.views.empty(); }
   [[nodiscard]] bool grid_only() const { return plan_.settings.comparison.terms == Terms::grid; }
-  [[nodiscard]] GoldSettings settings_at(const Rates& r) const {
-    GoldSettings s{plan_.grid, plan_.layout.granularity, r.gold, r.upsampling, r.interpolation};
-    s.midrange = plan_.settings.comparison.coefficients == Coefficients::midrange;
-    s.grid_only = grid_only();
-    s.anisotropic = plan_.layout.levels == Levels::anisotropic;
-    s.coarsening = plan_.layout.coarsening;
-    if (is_cone()) s.least_reach = reach_of_all(s);
-    return s;
-  }
+  [[nodiscard]] GoldSettings settings_at(const Rates& r) const { return gold_settings(plan_, r, is_cone()); }
 
   std::shared_ptr<GoldSource> source_at(const Rates& r) { return prepared_->source(settings_at(r)); }
 

@@ -1,0 +1,32 @@
+#include "host/certify/plan_parts.hpp"
+
+#include "host/certify/gold/gold_source.hpp"
+#include "host/volume/result_units.hpp"
+
+namespace vdvr {
+
+Plan to_world(Plan plan, const Units& units) {
+  const int density = units.density();
+  plan.grid = to_world(plan.grid, units);
+  plan.base.grid = to_world(plan.base.grid, units);
+  scale(plan.base.samples, density);
+  plan.epsilon_abs = to_world(plan.epsilon_abs, units);
+  plan.reference_range = to_world(plan.reference_range, units);
+  scale(plan.bounds, density);
+  scale(plan.budget, density);
+  return plan;
+}
+
+GoldSettings gold_settings(const Plan& plan, const Rates& rates, bool cone) {
+  const Comparison& comparison = plan.settings.comparison;
+  GoldSettings settings = gold_settings(plan.grid, plan.layout.granularity, rates);
+  settings.midrange = comparison.coefficients == Coefficients::midrange;
+  settings.anisotropic = plan.layout.levels == Levels::anisotropic;
+  settings.grid_only = comparison.terms == Terms::grid;
+  settings.coarsening = plan.layout.coarsening;
+  // Plans try several coarsenings, and gold is kept once.
+  if (cone) settings.least_reach = reach_of_all(settings);
+  return settings;
+}
+
+}  // namespace vdvr
