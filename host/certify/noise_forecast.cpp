@@ -19,8 +19,11 @@
 namespace vdvr {
 namespace {
 
-// What is asked of a brick lies below what is promised by more than sums in fp32 round by.
-constexpr double margin = 1 - 0x1p-18;
+// What is asked of a brick, as a density: below what is promised by more than sums in fp32 round by.
+double asked_of_brick(double multiple, double sigma) {
+  constexpr double margin = 1 - 0x1p-18;
+  return multiple * margin * sigma;
+}
 
 std::vector<std::uint8_t> seen_samples(const Volume& sigma, const ProjectionSet& scan,
                                        const FieldOptions& field) {
@@ -82,7 +85,8 @@ std::vector<SigmaForecast> foresee_in_sigma(const Plan& plan, const BrickSigma& 
   for (const double multiple : multiples) {
     NodeTolerance tolerance(0, sigma.of_brick);
     for (float& brick : tolerance.by_brick) {
-      const double wanted = multiple * margin * static_cast<double>(brick) - plan.budget.arithmetic.value;
+      const double wanted =
+          asked_of_brick(multiple, static_cast<double>(brick)) - plan.budget.arithmetic.value;
       // Below what rounding takes no tolerance is within reach: such a brick counts with the plan's.
       brick = static_cast<float>(from_world(wanted > 0 ? wanted : plan.epsilon_abs, foresight.units()));
       tolerance.of_all = std::max(tolerance.of_all, static_cast<double>(brick));
@@ -107,8 +111,8 @@ PlanInSigma make_plan_in_sigma(Device& device, const ProjectionSet& scan, double
                   scan, field, grid, granularity);
   CertifyOptions whole = options;
   whole.plan.estimate = false;
-  out.plan =
-      make_plan(device, scan, Tolerance{{}, multiple * margin * out.sigma.range.least}, whole, progress);
+  out.plan = make_plan(device, scan, Tolerance{{}, asked_of_brick(multiple, out.sigma.range.least)}, whole,
+                       progress);
   if (const auto foreseen = foresee_in_sigma(out.plan, out.sigma, std::array{multiple}); !foreseen.empty())
     out.plan.samples_ratio = foreseen.front().samples_ratio;
   return out;
@@ -142,7 +146,7 @@ std::vector<FilterForecast> foresee_filters(Device& device, const ProjectionSet&
 Refinement refinement_in_sigma(const BrickSigma& sigma, double multiple) {
   Refinement out;
   for (const float s : sigma.of_brick) {
-    out.by_brick.push_back(static_cast<float>(multiple * margin * static_cast<double>(s)));
+    out.by_brick.push_back(static_cast<float>(asked_of_brick(multiple, static_cast<double>(s))));
     out.everywhere_abs = std::max(out.everywhere_abs, multiple * static_cast<double>(s));
   }
   out.digest = fmt::format("{} sigma of {}", multiple, sigma_sha256(sigma.of_brick));

@@ -93,13 +93,10 @@ void check_tolerance(const Tolerance& tolerance) {
 }
 
 void set_epsilon(Plan& plan, const Tolerance& tolerance, double largest) {
-  const double given = tolerance.relative ? *tolerance.relative : *tolerance.absolute;
-  plan.epsilon = given;
-  plan.epsilon_abs = given * plan.reference_range;
-  if (tolerance.absolute || plan.settings.comparison.epsilon_of_max) {
-    plan.epsilon_abs = tolerance.absolute ? given : given * largest;
-    plan.epsilon = plan.reference_range > 0 ? plan.epsilon_abs / plan.reference_range : 0;
-  }
+  const bool of_max = plan.settings.comparison.epsilon_of_max;
+  plan.epsilon_abs = tolerance.as_density(of_max ? largest : plan.reference_range);
+  if (tolerance.relative && !of_max) plan.epsilon = *tolerance.relative;
+  else plan.epsilon = plan.reference_range > 0 ? plan.epsilon_abs / plan.reference_range : 0;
   if (!(plan.epsilon_abs > 0))
     throw InputError(
         "the field is constant over the covered samples, so a relative tolerance means nothing; give "
@@ -294,9 +291,7 @@ class Planner {
   // What every brick is brought within at first.
   [[nodiscard]] double everywhere() const {
     const auto& wanted = plan_.settings.everywhere;
-    if (!wanted) return plan_.epsilon_abs;
-    return wanted->relative ? *wanted->relative * (plan_.epsilon_abs / plan_.epsilon)
-                            : from_world(*wanted->absolute, units_);
+    return wanted ? from_world(*wanted, units_).as_density(plan_.whole()) : plan_.epsilon_abs;
   }
 
   // Storage, memory and time.
@@ -413,10 +408,9 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
         "every line integral is 0 in float32, so a relative tolerance means nothing; scale them, or give "
         "`epsilon_abs`");
   const Units& units = from.units;
-  Tolerance wanted = tolerance;
-  if (wanted.absolute) wanted.absolute = from_world(*wanted.absolute, units);
-  Plan plan = to_world(
-      Planner(device, from, from_world(grid, units), field, settings, progress).make(rates, wanted), units);
+  Plan plan = to_world(Planner(device, from, from_world(grid, units), field, settings, progress)
+                           .make(rates, from_world(tolerance, units)),
+                       units);
   plan.grid = plan.base.grid = grid;
   return plan;
 }

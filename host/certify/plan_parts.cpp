@@ -17,6 +17,11 @@ Plan to_world(Plan plan, const Units& units) {
   return plan;
 }
 
+Tolerance to_world(Tolerance tolerance, const Units& units) {
+  if (tolerance.absolute) tolerance.absolute = to_world(*tolerance.absolute, units);
+  return tolerance;
+}
+
 GoldSettings gold_settings(const Plan& plan, const Rates& rates, bool cone) {
   const Comparison& comparison = plan.settings.comparison;
   GoldSettings settings = gold_settings(plan.grid, plan.layout.granularity, rates);

@@ -7,8 +7,9 @@
 
 namespace vdvr {
 
-/// What is given in `units` in world units. Bounds by brick never become smaller.
+/// What is given in `units` in world units.
 Plan to_world(Plan plan, const Units& units);
+Tolerance to_world(Tolerance tolerance, const Units& units);
 
 /// Gold of a plan's grid, layout and comparison, at rates that it has chosen or tries.
 GoldSettings gold_settings(const Plan& plan, const Rates& rates, bool cone);

@@ -42,8 +42,7 @@ PictureRefinementOptions PlannedScan::refinement_options() const {
 }
 
 double PlannedScan::everywhere_abs() const {
-  const double everywhere = asked.tolerance.absolute.value_or(asked.tolerance.relative.value_or(1) *
-                                                              (plan.epsilon_abs / plan.epsilon));
+  const double everywhere = asked.tolerance.as_density(plan.whole());
   if (!(everywhere >= plan.epsilon_abs))
     throw InputError(
         fmt::format("`epsilon` {:.4g} lies below {:.4g}, the least that `picture_finest` asks of a brick",

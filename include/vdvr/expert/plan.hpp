@@ -18,6 +18,11 @@ namespace vdvr {
 struct Tolerance {
   std::optional<double> relative{};  ///< fraction of the reference range, or as the settings' comparison says
   std::optional<double> absolute{};  ///< density units; one of the two is set
+
+  /// As a density. `whole`: what a relative one is a fraction of.
+  [[nodiscard]] double as_density(double whole) const {
+    return absolute ? *absolute : relative.value_or(1) * whole;
+  }
 };
 
 /// What is not given is chosen by trial.
@@ -75,6 +80,9 @@ struct Plan {
   std::shared_ptr<PreparedScan> prepared{};
   /// Where something was foreseen: foresees builds of other tolerances.
   std::shared_ptr<Foresight> foresight{};
+
+  /// What its epsilon is a fraction of: other relative tolerances count by it too.
+  [[nodiscard]] double whole() const { return epsilon_abs / epsilon; }
 };
 
 /// Throws ToleranceError naming the binding term and the smallest epsilon that would do.
