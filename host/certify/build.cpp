@@ -218,8 +218,18 @@ std::uint64_t memory_bytes(const MixedVolume& volume) {
   return bytes;
 }
 
-// Whether a measured volume will do; else the smaller tolerance that it is brought within.
-using Accept = std::function<std::optional<NodeTolerance>(const Measured&)>;
+// What a measured volume is certified for, and whether that will do.
+struct Verdict {
+  Certificate certificate{};
+  std::optional<NodeTolerance> smaller{};  // what it is to be brought within
+  bool refined = false;                    // bricks are to be classified anew, for what was asked of them
+};
+using Judge = std::function<Verdict(const Measured&)>;
+
+struct Judged {
+  MixedVolume volume{};
+  Verdict verdict{};
+};
 
 // Those that a smaller tolerance may ask more of than the one they were measured with.
 std::vector<std::uint8_t> bricks_above(const std::vector<BrickMeasure>& measures,
@@ -230,9 +240,9 @@ std::vector<std::uint8_t> bricks_above(const std::vector<BrickMeasure>& measures
   return above;
 }
 
-// Closes, packs, measures; raises bricks until every node is within the tolerance, and the volume accepted.
-Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& bricks,
-                           NodeTolerance tolerance, const Accept& accept) {
+// Closes, packs, measures; raises bricks until every node is within the tolerance, and no smaller one asked.
+Judged close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& bricks, NodeTolerance tolerance,
+                         const Judge& judge) {
   // Bricks that stay at level 0 were measured on the base samples while classifying, and closing does not
   // change those.
   std::vector<std::uint8_t> pending(bricks.level.size());
@@ -267,10 +277,10 @@ Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& b
       out.volume = std::move(volume);
       out.bricks = test.measures();
       out.slack = test.bounds();
-      std::optional<NodeTolerance> smaller = accept(out);
-      if (!smaller) return out;
+      Verdict verdict = judge(out);
+      if (!verdict.smaller) return {std::move(out.volume), std::move(verdict)};
       volume = std::move(out.volume);
-      tolerance = std::move(*smaller);
+      tolerance = std::move(*verdict.smaller);
       test.measure(field, volume.level, tolerance, bricks_above(test.measures(), tolerance), "repair");
       in.watch.lap("verify");
     }
@@ -281,9 +291,9 @@ Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& b
 }
 
 // The volume of these base samples within the tolerance; of a share, what it classifies, and no volume.
-Measured measured_volume(const Inputs& in, const std::vector<float>& base, const IntegerLattice& lattice,
-                         const NodeTolerance& tolerance, const Accept& accept,
-                         const std::optional<BuildShare>& share) {
+Judged judged_volume(const Inputs& in, const std::vector<float>& base, const IntegerLattice& lattice,
+                     const NodeTolerance& tolerance, const Judge& judge,
+                     const std::optional<BuildShare>& share) {
   HostMemory tiles(in.state);
   tiles.count(4 * base.size(), "the base samples, rounded,");
   OpenBricks bricks = open_bricks(in.plan, base, lattice, in.budget);
@@ -295,7 +305,7 @@ Measured measured_volume(const Inputs& in, const std::vector<float>& base, const
       bricks.tolerance.push_back(static_cast<float>(tolerance.of(i)));
   classify(in, *test, bricks, tolerance, share.value_or(BuildShare{}));
   if (share) return {};
-  return close_and_measure(in, *test, bricks, tolerance, accept);
+  return close_and_measure(in, *test, bricks, tolerance, judge);
 }
 
 void count_inputs(HostMemory& host, const ProjectionSet& scan, const Plan& plan) {
@@ -368,31 +378,33 @@ BuildResult build_in_units(Device& device, const ScanInUnits& of_scan, Plan plan
                       samplers.first_tolerance(plan.epsilon_abs));
   records.begin(
       journal_head(kinds, scan, plan, digest, options, gold.fine(), samplers.first_tolerance(epsilon_abs)));
-  bool refined = false;
-  const Accept accept = [&](const Measured& measured) -> std::optional<NodeTolerance> {
+  const Judge judge = [&](const Measured& measured) {
     const SamplerTerms sampler = samplers.of(measured.volume);
-    result.certificate =
-        fill_certificate(in, device, scan, filtered, options, measured, sampler, epsilon_abs);
+    Verdict verdict{fill_certificate(in, device, scan, filtered, options, measured, sampler, epsilon_abs)};
     const double rest = samplers.beside_nodes(sampler);
     const bool asked =
-        refinement && refinement->asks(measured.volume, result.certificate, rest,
+        refinement && refinement->asks(measured.volume, verdict.certificate, rest,
                                        samplers.first_tolerance(plan.epsilon_abs) / (by_brick ? 2 : 1));
     // What is known from the start only changes by what samplers were measured to take: little, of few
     // bricks.
-    if (asked && by_brick) return refinement->with_bricks(samplers.now());
-    refined = asked;
-    if (refined) return std::nullopt;
-    std::optional<NodeTolerance> less = samplers.smaller(result.certificate, measured.bricks);
-    if (less && refinement) less->lower_to(refinement->with_bricks(less->of_all));
-    return less;
+    if (asked && by_brick) {
+      verdict.smaller = refinement->with_bricks(samplers.now());
+    } else if (asked) {
+      verdict.refined = true;
+    } else {
+      verdict.smaller = samplers.smaller(verdict.certificate, measured.bricks);
+      if (verdict.smaller && refinement)
+        verdict.smaller->lower_to(refinement->with_bricks(verdict.smaller->of_all));
+    }
+    return verdict;
   };
   // Bricks are classified anew for what is asked of them: repair would raise them a level at a time.
   const auto volume_on = [&](const IntegerLattice& lattice) {
     for (;;) {
       NodeTolerance tolerance = samplers.begin();
       if (refinement) tolerance.lower_to(refinement->with_bricks(tolerance.of_all));
-      MixedVolume volume = measured_volume(in, base, lattice, tolerance, accept, share).volume;
-      if (!refined && !samplers.anew()) return volume;
+      Judged made = judged_volume(in, base, lattice, tolerance, judge, share);
+      if (!made.verdict.refined && !samplers.anew()) return made;
     }
   };
   const auto volume_in_integers_or_not = [&] {
@@ -406,13 +418,18 @@ BuildResult build_in_units(Device& device, const ScanInUnits& of_scan, Plan plan
       return volume_on(lattice_of(base, plan, units, StorageChoice::f32, {}));
     }
   };
-  try {
-    result.volume = volume_in_integers_or_not();
-  } catch (const ToleranceError&) {
-    if (!samplers.raised_for_image3d()) throw;
-    samplers.give_up_image3d();
-    result.volume = volume_in_integers_or_not();
-  }
+  const auto with_image3d_or_not = [&] {
+    try {
+      return volume_in_integers_or_not();
+    } catch (const ToleranceError&) {
+      if (!samplers.raised_for_image3d()) throw;
+      samplers.give_up_image3d();
+      return volume_in_integers_or_not();
+    }
+  };
+  Judged made = with_image3d_or_not();
+  result.volume = std::move(made.volume);
+  result.certificate = std::move(made.verdict.certificate);
   if (crew) {
     result.message_bytes = crew->bytes();
     result.message_seconds = crew->message_seconds();
