@@ -330,7 +330,7 @@ BuildResult build_in_units(Device& device, const ScanInUnits& of_scan, Plan plan
     throw InputError("`roi` meets no brick of the grid");
 
   // Six taps need values alone.
-  const bool prepared = plan.prepared && plan.prepared->is_of(state, of_scan, plan.field);
+  const bool prepared = plan.prepared && plan.prepared->of == PreparedOf(state, of_scan, plan.field);
   const auto from = prepared
                         ? plan.prepared
                         : std::make_shared<PreparedScan>(state, of_scan, plan.field,

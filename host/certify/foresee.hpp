@@ -39,7 +39,7 @@ class Foresight {
   /// their measure, at the pace of what was foreseen last.
   double repair_seconds(const std::vector<std::uint8_t>& raises);
 
-  [[nodiscard]] const Units& units() const { return prepared_->units; }
+  [[nodiscard]] const Units& units() const { return prepared_->of.units; }
   [[nodiscard]] GoldRates& gold() { return gold_; }
   /// Of the base samples, on the bricks that were looked at last.
   [[nodiscard]] const std::vector<BrickMeasure>& measured() const { return measured_; }

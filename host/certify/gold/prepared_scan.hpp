@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "host/base/opencl/host_memory.hpp"
 #include "host/certify/bounds/projection_bounds.hpp"
@@ -12,6 +13,20 @@
 #include "host/scan/units.hpp"
 
 namespace vdvr {
+
+/// What a preparation is of. Its user can change a scan between plan and build, and read it again: samples
+/// are told by a checksum, another scan's differs but by an accident of 2^-64. Cost: a pass over them.
+struct PreparedOf {
+  PreparedOf(const opencl::State& state, const ScanInUnits& from, const FieldOptions& field);
+  bool operator==(const PreparedOf&) const = default;
+
+  const opencl::State* state;
+  FieldOptions field;
+  Units units;
+  ParallelGeometry geometry;
+  std::optional<ConeGeometry> cone;
+  std::uint64_t samples;
+};
 
 struct PreparedScan {
   /// Of which views sups are taken, and whether of derivatives too, which interpolation by two or four taps
@@ -26,23 +41,18 @@ struct PreparedScan {
   PreparedScan(const PreparedScan&) = delete;
   PreparedScan& operator=(const PreparedScan&) = delete;
 
-  /// Whether it is of this scan and field on this device.
-  [[nodiscard]] bool is_of(const opencl::State& state, const ScanInUnits& from,
-                           const FieldOptions& field) const;
   /// What gold of these settings reads: rates that differ in gold alone share it.
   std::shared_ptr<GoldSource> source(const GoldSettings& settings);
 
   std::shared_ptr<opencl::State> shared;  ///< first: what follows counts its memory there to the last
   opencl::State& state;
-  const Units units;  ///< of all that follows
+  const PreparedOf of;
   FilteredScan filtered;
   Upsampler upsampler;
   FieldSups sups;
 
  private:
   HostMemory host_;
-  FieldOptions field_;
-  std::uint64_t checksum_ = 0;
   std::shared_ptr<GoldSource> source_;
   GoldSettings settings_;  // of source_
 };
