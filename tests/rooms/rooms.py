@@ -23,7 +23,7 @@ import tempfile
 # A room includes those above it; a wing is the first part of a room's name, and its rooms stand together.
 ROOMS = ["base/system", "base/opencl",
          "files/hdf5", "files/io",
-         "scan/geometry", "scan/center", "scan/prepare", "scan/raw", "scan", "scan/simulate",
+         "scan/geometry", "scan/center", "scan/prepare", "scan/raw", "scan/open", "scan", "scan/simulate",
          "field/fbp", "field/fdk", "field/noise",
          "volume", "volume/sampler",
          "certify/bounds", "certify/kept", "certify/gold", "certify/crew", "certify/closing", "certify",
