@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "host/base/system/casts.hpp"
-#include "host/certify/foresee.hpp"
+#include "host/certify/forecaster.hpp"
 #include "host/certify/gold/gold_settings.hpp"
 #include "host/volume/bricks.hpp"
 #include "vdvr/error.hpp"
@@ -77,10 +77,10 @@ BrickSigma sigma_of_plan(Device& device, const ProjectionSet& scan, const Plan& 
       scan, plan.field, plan.grid, granularity);
 }
 
-std::vector<SigmaForecast> foresee_in_sigma(const Plan& plan, const BrickSigma& sigma,
-                                            std::span<const double> multiples) {
-  if (!plan.foresight || plan.estimated) return {};
-  Foresight& foresight = *plan.foresight;
+std::vector<SigmaForecast> forecast_in_sigma(const Plan& plan, const BrickSigma& sigma,
+                                             std::span<const double> multiples) {
+  if (!plan.forecaster || plan.estimated) return {};
+  Forecaster& forecaster = *plan.forecaster;
   std::vector<SigmaForecast> out;
   for (const double multiple : multiples) {
     NodeTolerance tolerance(0, sigma.of_brick);
@@ -88,10 +88,10 @@ std::vector<SigmaForecast> foresee_in_sigma(const Plan& plan, const BrickSigma& 
       const double wanted =
           asked_of_brick(multiple, static_cast<double>(brick)) - plan.budget.arithmetic.value;
       // Below what rounding takes no tolerance is within reach: such a brick counts with the plan's.
-      brick = static_cast<float>(from_world(wanted > 0 ? wanted : plan.epsilon_abs, foresight.units()));
+      brick = static_cast<float>(from_world(wanted > 0 ? wanted : plan.epsilon_abs, forecaster.units()));
       tolerance.of_all = std::max(tolerance.of_all, static_cast<double>(brick));
     }
-    if (tolerance.of_all > 0) out.push_back({multiple, foresight.foresee(tolerance).samples_ratio});
+    if (tolerance.of_all > 0) out.push_back({multiple, forecaster.forecast(tolerance).samples_ratio});
   }
   return out;
 }
@@ -113,15 +113,15 @@ PlanInSigma make_plan_in_sigma(Device& device, const ProjectionSet& scan, double
   whole.plan.estimate = false;
   out.plan = make_plan(device, scan, Tolerance{{}, asked_of_brick(multiple, out.sigma.range.least)}, whole,
                        progress);
-  if (const auto foreseen = foresee_in_sigma(out.plan, out.sigma, std::array{multiple}); !foreseen.empty())
-    out.plan.samples_ratio = foreseen.front().samples_ratio;
+  if (const auto forecast = forecast_in_sigma(out.plan, out.sigma, std::array{multiple}); !forecast.empty())
+    out.plan.samples_ratio = forecast.front().samples_ratio;
   return out;
 }
 
-std::vector<FilterForecast> foresee_filters(Device& device, const ProjectionSet& scan,
-                                            const Tolerance& tolerance, std::optional<double> multiple,
-                                            const ScanNoise& noise, const CertifyOptions& options,
-                                            const Progress& progress) {
+std::vector<FilterForecast> forecast_filters(Device& device, const ProjectionSet& scan,
+                                             const Tolerance& tolerance, std::optional<double> multiple,
+                                             const ScanNoise& noise, const CertifyOptions& options,
+                                             const Progress& progress) {
   std::vector<FilterForecast> out;
   for (const auto& [filter, name] : ramp_windows) {
     CertifyOptions with = options;

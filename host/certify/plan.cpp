@@ -18,7 +18,7 @@
 #include "host/certify/bounds/paper_bounds.hpp"
 #include "host/certify/choose_coarsening.hpp"
 #include "host/certify/choose_rates.hpp"
-#include "host/certify/foresee.hpp"
+#include "host/certify/forecaster.hpp"
 #include "host/certify/gold/base_of_gold.hpp"
 #include "host/certify/gold/gold_batch.hpp"
 #include "host/certify/gold/prepared_scan.hpp"
@@ -178,13 +178,13 @@ class Planner {
     // They are made of derivatives along the axes of parallel beam.
     if (!is_cone())
       plan_.bounds = global_bounds(state_, prepared_->filtered, prepared_->sups, plan_.base,
-                                   plan_.settings.foresee, estimates_views_);
+                                   plan_.settings.forecast, estimates_views_);
     report(progress_, "plan", 0.6);
     const Chosen chosen = choose(all);
     take(chosen);
     report(progress_, "plan", 0.8);
     lay_out_base(chosen.trial);
-    if (plan_.settings.foresee) foresee(chosen.trial);
+    if (plan_.settings.forecast) forecast(chosen.trial);
     report(progress_, "plan", 1.0);
     plan_.prepared = prepared_;
     if (estimates_views_) {
@@ -206,11 +206,11 @@ class Planner {
     return small_or_paper ? PreparedScan::Sups::of_derivatives : PreparedScan::Sups::of_values;
   }
 
-  // What trials and foresight look at: kept from the first trial on, all at once.
+  // What trials and forecasts look at: kept from the first trial on, all at once.
   const std::vector<std::uint8_t>& look(GoldRates& gold) {
     if (looked_at_.empty()) {
       looked_at_ = gold.fine().bricks_near_coverage();
-      if (plan_.settings.foresee) {
+      if (plan_.settings.forecast) {
         looked_at_ =
             bricks_to_look_at(gold.coarse() ? *gold.coarse() : gold.fine(), prepared_->filtered.geometry);
         gold.fine().prepare(looked_at_, GoldStream::For::samples, {});
@@ -295,7 +295,7 @@ class Planner {
   }
 
   // Storage, memory and time.
-  void foresee(const Trial& t) {
+  void forecast(const Trial& t) {
     GoldRates gold(state_, prepared_->filtered, prepared_->sups, settings_at(plan_.rates),
                    source_at(plan_.rates));
     const std::vector<std::uint8_t>& looked_at = look(gold);
@@ -309,27 +309,26 @@ class Planner {
                          stored, {}, source_at(plan_.rates));
     });
     const double all = size(gold.fine().bricks_near_coverage());
-    plan_.foresight = std::make_shared<Foresight>(prepared_, settings_at(plan_.rates), plan_.base,
-                                                  std::move(stored), looked_at);
-    const Foreseen foreseen = plan_.foresight->foresee(everywhere() - t.arithmetic);
-    plan_.samples_ratio = foreseen.samples_ratio;
+    plan_.forecaster = std::make_shared<Forecaster>(prepared_, settings_at(plan_.rates), plan_.base,
+                                                    std::move(stored), looked_at);
+    const BuildForecast build = plan_.forecaster->forecast(everywhere() - t.arithmetic);
+    plan_.samples_ratio = build.samples_ratio;
     const double probing = seconds_of([&] { probe_filters(device_); });  // as build will
-    plan_.seconds_of_rows = preparation_ + foreseen.kept_seconds;
-    plan_.seconds =
-        preparation_ + fitting * all / std::max(1.0, size(looked_at)) + foreseen.seconds + probing;
-    foresee_memory(foreseen, gold.fine().source()->kept);
+    plan_.seconds_of_rows = preparation_ + build.kept_seconds;
+    plan_.seconds = preparation_ + fitting * all / std::max(1.0, size(looked_at)) + build.seconds + probing;
+    forecast_memory(build, gold.fine().source()->kept);
   }
 
   // Gold that is kept; the base samples, fitted, rounded and on the device; tiles before and after closing
   // and on the device; the scan as read and filtered; and what the trial took beside these, batches of
   // blocks.
-  void foresee_memory(const Foreseen& foreseen, const KeptGold& kept) {
+  void forecast_memory(const BuildForecast& build, const KeptGold& kept) {
     const std::uint64_t base = 4 * plan_.base.samples.size(),
                         scan = scan_bytes_ + prepared_->filtered.samples.resident_bytes(),
                         held = scan + 2 * base + kept.bytes(), peak = state_.memory.peak();
-    plan_.memory_of_rows = kept.bytes() + foreseen.kept_bytes;
+    plan_.memory_of_rows = kept.bytes() + build.kept_bytes;
     plan_.memory_of_cells = 3 * base;
-    plan_.tile_bytes = foreseen.tile_bytes;
+    plan_.tile_bytes = build.tile_bytes;
     plan_.memory_bytes = scan + plan_.memory_of_rows + plan_.memory_of_cells +
                          memory_of_tiles(plan_.tile_bytes, state_.memory.limit(), state_.info.is_gpu) +
                          (peak > held ? peak - held : 0);
@@ -358,7 +357,7 @@ Plan of_all_rows(Plan plan, const RowWindow& window, const ProjectionSet& scan, 
   const ParallelGeometry& g = scan.geometry;
   plan.estimated = true;
   plan.prepared = nullptr;
-  plan.foresight = nullptr;
+  plan.forecaster = nullptr;
   plan.notes.push_back(
       fmt::format("estimated from the rows {} to {} of {}: the range, the bounds and what is foreseen may "
                   "differ in other rows",

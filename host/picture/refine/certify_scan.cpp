@@ -90,7 +90,7 @@ BuildResult certify_planned(Device& device, const ProjectionSet& scan, PlannedSc
 BuildResult certify_scan(Device& device, const ProjectionSet& scan, const AskedTolerance& asked,
                          const std::optional<ScanNoise>& noise, CertifyOptions options,
                          const Progress& progress) {
-  options.plan.foresee = false;
+  options.plan.forecast = false;
   PlannedScan planned = plan_scan(device, scan, asked, noise, options, progress);
   return certify_planned(device, scan, planned, std::move(options), progress);
 }

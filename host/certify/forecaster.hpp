@@ -10,7 +10,8 @@
 
 namespace vdvr {
 
-struct Foreseen {
+/// What a build will take.
+struct BuildForecast {
   double samples_ratio = 0;  ///< samples stored per base sample, index and tiles included
   double seconds = 0;        ///< of classification and verification
   double kept_seconds = 0;   ///< of those, what gold takes that is kept
@@ -22,18 +23,18 @@ struct Foreseen {
 /// the lowest to the highest, at places that stand for equal areas of the covered disc.
 std::vector<std::uint8_t> bricks_to_look_at(GoldStream& stream, const ParallelGeometry& geometry);
 
-/// Of what plans look at, foresees builds of different tolerances. Keeps the prepared scan, and is in its
+/// Of what plans look at, forecasts builds of different tolerances. Keeps the prepared scan, and is in its
 /// units.
-class Foresight {
+class Forecaster {
  public:
   /// `base` holds F on the grid, `stored` the base samples to store.
-  Foresight(std::shared_ptr<PreparedScan> prepared, const GoldSettings& settings, const Volume& base,
-            std::vector<float> stored, std::vector<std::uint8_t> looked_at);
+  Forecaster(std::shared_ptr<PreparedScan> prepared, const GoldSettings& settings, const Volume& base,
+             std::vector<float> stored, std::vector<std::uint8_t> looked_at);
 
   /// Classifies a few whole blocks, which tells the time, and some bricks of every stratum of expected error,
   /// which tells the storage, among those to look at. `tolerance` is what the node test may take. Raising
   /// bricks after closing is not foreseen. Cost: about 1 % of the build.
-  Foreseen foresee(const NodeTolerance& tolerance);
+  BuildForecast forecast(const NodeTolerance& tolerance);
 
   /// What closing takes that adds so many levels to bricks, one in each round of repair: their tiles anew and
   /// their measure, at the pace of what was foreseen last.
