@@ -1,5 +1,5 @@
 // Weights by Lagrange's formula in double precision, norms by adding them up.
-#include "host/verify/witness/verify_lagrange.hpp"
+#include "host/verify/witness/lagrange.hpp"
 
 #include <algorithm>
 #include <array>
