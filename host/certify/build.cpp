@@ -74,14 +74,6 @@ FilterErrors filters_of(const std::vector<Crew::Kind>& kinds) {
   return worst;
 }
 
-// Of integer samples.
-IntegerLattice lattice_of(const std::vector<float>& base, const Plan& plan, const Units& units,
-                          StorageChoice storage, const FilterErrors& filters) {
-  return choose_lattice(base, storage,
-                        most_rounding(plan.epsilon_abs, plan.layout.levels == Levels::anisotropic),
-                        units.density(), filters);
-}
-
 MemoryBudget memory_budget_of(const opencl::State& state, const ProjectionSet& scan,
                               const BuildOptions& options) {
   const std::uint64_t share = state.memory.limit() / 8;
@@ -308,6 +300,16 @@ Judged judged_volume(const Inputs& in, const std::vector<float>& base, const Int
   return close_and_measure(in, *test, bricks, tolerance, judge);
 }
 
+// The plan's own, where it is of this scan.
+std::shared_ptr<PreparedScan> preparation_of(opencl::State& state, const ScanInUnits& from, const Plan& plan,
+                                             const Progress& progress) {
+  if (plan.prepared && plan.prepared->of == PreparedOf(state, from, plan.field)) return plan.prepared;
+  // Six taps need values alone.
+  const auto sups = plan.rates.interpolation == Interpolation::six_taps ? PreparedScan::Sups::of_values
+                                                                        : PreparedScan::Sups::of_derivatives;
+  return std::make_shared<PreparedScan>(state, from, plan.field, sups, progress);
+}
+
 void count_inputs(HostMemory& host, const ProjectionSet& scan, const Plan& plan) {
   host.count(scan.data.resident_bytes(), "the projections, as read,");
   host.count(4 * plan.base.samples.size(), "the base samples");
@@ -329,15 +331,7 @@ BuildResult build_in_units(Device& device, const ScanInUnits& of_scan, Plan plan
   if (std::find(selected.begin(), selected.end(), 1) == selected.end())
     throw InputError("`roi` meets no brick of the grid");
 
-  // Six taps need values alone.
-  const bool prepared = plan.prepared && plan.prepared->of == PreparedOf(state, of_scan, plan.field);
-  const auto from = prepared
-                        ? plan.prepared
-                        : std::make_shared<PreparedScan>(state, of_scan, plan.field,
-                                                         plan.rates.interpolation == Interpolation::six_taps
-                                                             ? PreparedScan::Sups::of_values
-                                                             : PreparedScan::Sups::of_derivatives,
-                                                         progress);
+  const std::shared_ptr<PreparedScan> from = preparation_of(state, of_scan, plan, progress);
   const FilteredScan& filtered = from->filtered;
   watch.lap("filter");
   GoldSettings settings = gold_settings(plan, plan.rates, scan.cone.has_value());
@@ -356,7 +350,8 @@ BuildResult build_in_units(Device& device, const ScanInUnits& of_scan, Plan plan
   const std::vector<Crew::Kind> kinds =
       crew ? crew->kinds() : std::vector<Crew::Kind>{{device.info(), probe_filters(device), 0}};
   watch.lap("probe");
-  settings.lattice = lattice_of(base, plan, units, options.storage, filters_of(kinds));
+  settings.lattice =
+      lattice_of(base, plan.epsilon_abs, plan.layout, units, options.storage, filters_of(kinds));
   GoldRates gold(state, filtered, from->sups, settings, from->source(settings));
   BlockRecords records(options.journal, options.parts);
   JournalledRates journalled(gold, &records, others);
@@ -415,7 +410,7 @@ BuildResult build_in_units(Device& device, const ScanInUnits& of_scan, Plan plan
     } catch (const ToleranceError&) {
       // Rounding can take what slack leaves at the gold rate, where nothing finer is left.
       if (!(settings.lattice.step > 0) || options.storage != StorageChoice::automatic || share) throw;
-      return volume_on(lattice_of(base, plan, units, StorageChoice::f32, {}));
+      return volume_on(lattice_of(base, plan.epsilon_abs, plan.layout, units, StorageChoice::f32, {}));
     }
   };
   const auto with_image3d_or_not = [&] {

@@ -10,6 +10,7 @@
 
 #include "host/base/opencl/host_memory.hpp"
 #include "host/base/system/casts.hpp"
+#include "host/certify/plan_parts.hpp"
 #include "host/volume/bricks.hpp"
 
 namespace vdvr {
@@ -262,7 +263,10 @@ double Forecaster::first_pass_seconds(const NodeTolerance& tolerance) {
   return large.seconds(!screens, purpose, near_);
 }
 
-BuildForecast Forecaster::forecast(const NodeTolerance& tolerance) {
+BuildForecast Forecaster::forecast(NodeTolerance tolerance) {
+  const Units& units = prepared_->of.units;
+  tolerance.of_all = from_world(tolerance.of_all, units);
+  for (float& one : tolerance.by_brick) one = static_cast<float>(from_world(static_cast<double>(one), units));
   const GoldSettings& settings = gold_.fine().settings();
   const Index3 n = Bricks(settings.grid, settings.granularity).along();
   const bool screens = gold_.coarse() != nullptr;
@@ -334,6 +338,20 @@ BuildForecast Forecaster::forecast(const NodeTolerance& tolerance) {
   add(false, For::measuring, bricks[coarse_refined]);
   add(true, For::measuring, hard);
   return out;
+}
+
+std::vector<BrickMeasure> Forecaster::measured() const {
+  std::vector<BrickMeasure> out = measured_;
+  for (BrickMeasure& m : out)
+    for (float* value : {&m.error, &m.slack})
+      *value = static_cast<float>(to_world(static_cast<double>(*value), prepared_->of.units));
+  return out;
+}
+
+IntegerLattice Forecaster::lattice(const Plan& plan, StorageChoice storage,
+                                   const FilterErrors& filters) const {
+  return lattice_of(stored_, from_world(plan.epsilon_abs, prepared_->of.units), plan.layout,
+                    prepared_->of.units, storage, filters);
 }
 
 double Forecaster::repair_seconds(const std::vector<std::uint8_t>& raises) {

@@ -7,6 +7,8 @@
 
 #include "host/certify/classify_bricks.hpp"
 #include "host/certify/gold/prepared_scan.hpp"
+#include "host/volume/choose_lattice.hpp"
+#include "vdvr/expert/plan.hpp"
 
 namespace vdvr {
 
@@ -23,28 +25,30 @@ struct BuildForecast {
 /// the lowest to the highest, at places that stand for equal areas of the covered disc.
 std::vector<std::uint8_t> bricks_to_look_at(GoldStream& stream, const ParallelGeometry& geometry);
 
-/// Of what plans look at, forecasts builds of different tolerances. Keeps the prepared scan, and is in its
-/// units.
+/// Of what plans look at, forecasts builds of different tolerances. Keeps the prepared scan, in whose units
+/// it computes; what it takes and gives is in world units.
 class Forecaster {
  public:
-  /// `base` holds F on the grid, `stored` the base samples to store.
+  /// `base` holds F on the grid, `stored` the base samples to store: these in the prepared scan's units, as
+  /// the settings are.
   Forecaster(std::shared_ptr<PreparedScan> prepared, const GoldSettings& settings, const Volume& base,
              std::vector<float> stored, std::vector<std::uint8_t> looked_at);
 
   /// Classifies a few whole blocks, which tells the time, and some bricks of every stratum of expected error,
   /// which tells the storage, among those to look at. `tolerance` is what the node test may take. Raising
   /// bricks after closing is not foreseen. Cost: about 1 % of the build.
-  BuildForecast forecast(const NodeTolerance& tolerance);
+  BuildForecast forecast(NodeTolerance tolerance);
 
   /// What closing takes that adds so many levels to bricks, one in each round of repair: their tiles anew and
   /// their measure, at the pace of what was foreseen last.
   double repair_seconds(const std::vector<std::uint8_t>& raises);
 
-  [[nodiscard]] const Units& units() const { return prepared_->of.units; }
-  [[nodiscard]] GoldRates& gold() { return gold_; }
-  /// Of the base samples, on the bricks that were looked at last.
-  [[nodiscard]] const std::vector<BrickMeasure>& measured() const { return measured_; }
-  [[nodiscard]] const std::vector<float>& stored() const { return stored_; }
+  /// Errors and slack of the base samples, on the bricks that were looked at last.
+  [[nodiscard]] std::vector<BrickMeasure> measured() const;
+  /// Of the base samples to store, of which there are so many.
+  [[nodiscard]] IntegerLattice lattice(const Plan& plan, StorageChoice storage,
+                                       const FilterErrors& filters) const;
+  [[nodiscard]] std::size_t stored() const { return stored_.size(); }
   /// Bricks that may hold a tested node.
   [[nodiscard]] const std::vector<std::uint8_t>& near() const { return near_; }
 

@@ -80,7 +80,6 @@ BrickSigma sigma_of_plan(Device& device, const ProjectionSet& scan, const Plan& 
 std::vector<SigmaForecast> forecast_in_sigma(const Plan& plan, const BrickSigma& sigma,
                                              std::span<const double> multiples) {
   if (!plan.forecaster || plan.estimated) return {};
-  Forecaster& forecaster = *plan.forecaster;
   std::vector<SigmaForecast> out;
   for (const double multiple : multiples) {
     NodeTolerance tolerance(0, sigma.of_brick);
@@ -88,10 +87,10 @@ std::vector<SigmaForecast> forecast_in_sigma(const Plan& plan, const BrickSigma&
       const double wanted =
           asked_of_brick(multiple, static_cast<double>(brick)) - plan.budget.arithmetic.value;
       // Below what rounding takes no tolerance is within reach: such a brick counts with the plan's.
-      brick = static_cast<float>(from_world(wanted > 0 ? wanted : plan.epsilon_abs, forecaster.units()));
+      brick = static_cast<float>(wanted > 0 ? wanted : plan.epsilon_abs);
       tolerance.of_all = std::max(tolerance.of_all, static_cast<double>(brick));
     }
-    if (tolerance.of_all > 0) out.push_back({multiple, forecaster.forecast(tolerance).samples_ratio});
+    if (tolerance.of_all > 0) out.push_back({multiple, plan.forecaster->forecast(tolerance).samples_ratio});
   }
   return out;
 }

@@ -311,7 +311,7 @@ class Planner {
     const double all = size(gold.fine().bricks_near_coverage());
     plan_.forecaster = std::make_shared<Forecaster>(prepared_, settings_at(plan_.rates), plan_.base,
                                                     std::move(stored), looked_at);
-    const BuildForecast build = plan_.forecaster->forecast(everywhere() - t.arithmetic);
+    const BuildForecast build = plan_.forecaster->forecast(to_world(everywhere() - t.arithmetic, units_));
     plan_.samples_ratio = build.samples_ratio;
     const double probing = seconds_of([&] { probe_filters(device_); });  // as build will
     plan_.seconds_of_rows = preparation_ + build.kept_seconds;

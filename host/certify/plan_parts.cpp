@@ -34,4 +34,10 @@ GoldSettings gold_settings(const Plan& plan, const Rates& rates, bool cone) {
   return settings;
 }
 
+IntegerLattice lattice_of(std::span<const float> base, double epsilon_abs, const VolumeLayout& layout,
+                          const Units& units, StorageChoice storage, const FilterErrors& filters) {
+  return choose_lattice(base, storage, most_rounding(epsilon_abs, layout.levels == Levels::anisotropic),
+                        units.density(), filters);
+}
+
 }  // namespace vdvr

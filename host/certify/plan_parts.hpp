@@ -1,8 +1,12 @@
-// What a plan is to those who carry it out: in their units (units.hpp), and as settings of gold.
+// What a plan is to those who carry it out: in their units (units.hpp), as settings of gold and of what
+// is stored.
 #pragma once
+
+#include <span>
 
 #include "host/certify/gold/gold_settings.hpp"
 #include "host/scan/units.hpp"
+#include "host/volume/choose_lattice.hpp"
 #include "vdvr/expert/plan.hpp"
 
 namespace vdvr {
@@ -13,5 +17,9 @@ Tolerance to_world(Tolerance tolerance, const Units& units);
 
 /// Gold of a plan's grid, layout and comparison, at rates that it has chosen or tries.
 GoldSettings gold_settings(const Plan& plan, const Rates& rates, bool cone);
+
+/// Of integer samples of a base in `units`, as `epsilon_abs` is.
+IntegerLattice lattice_of(std::span<const float> base, double epsilon_abs, const VolumeLayout& layout,
+                          const Units& units, StorageChoice storage, const FilterErrors& filters);
 
 }  // namespace vdvr

@@ -11,7 +11,6 @@
 #include "host/field/fdk/filter_cone.hpp"
 #include "host/picture/refine/brick_forecast.hpp"
 #include "host/picture/refine/picture_rounds.hpp"
-#include "host/scan/units.hpp"
 #include "host/volume/sampler/sampler_terms.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/picture_refinement.hpp"
@@ -87,11 +86,7 @@ class PictureForecaster {
                    std::vector<float>(forecaster_.near().size(), std::numeric_limits<float>::infinity())};
     bricks_.emplace(plan.base, plan.layout, plan.rates.gold,
                     plan.budget.projection.value + plan.budget.gold.value);
-    std::vector<BrickMeasure> measured = forecaster_.measured();
-    for (BrickMeasure& m : measured)
-      for (float* value : {&m.error, &m.slack})
-        *value = static_cast<float>(to_world(static_cast<double>(*value), forecaster_.units()));
-    bricks_->compare(measured);
+    bricks_->compare(forecaster_.measured());
   }
 
   PictureForecast make(StorageChoice storage) {
@@ -129,7 +124,7 @@ class PictureForecaster {
     for (std::size_t i = 0; i < near.size(); ++i)
       if (near[i]) own[i] = bricks_->level(i, tolerances_.of(i));
     const std::vector<BrickForecast::Level> closed = bricks_->closed(own);
-    const std::uint64_t base = count(std::ssize(forecaster_.stored()));
+    const std::uint64_t base = forecaster_.stored();
     Samples samples{base, base, std::vector<std::uint8_t>(near.size(), 0)};
     bounds.assign(near.size(), std::numeric_limits<float>::infinity());
     for (std::size_t i = 0; i < near.size(); ++i) {
@@ -154,23 +149,14 @@ class PictureForecaster {
 
   // Storage and time at the tolerances of the last round, by what some bricks need.
   void forecast_last(StorageChoice storage, double pictures, PictureForecast& out) {
-    NodeTolerance last(tolerances_.everywhere, tolerances_.by_brick);
-    last.of_all = from_world(last.of_all, forecaster_.units());
-    for (float& one : last.by_brick)
-      one = static_cast<float>(from_world(static_cast<double>(one), forecaster_.units()));
-    const BuildForecast build = forecaster_.forecast(last);
+    const BuildForecast build = forecaster_.forecast({tolerances_.everywhere, tolerances_.by_brick});
     out.samples_ratio = closing_ * build.samples_ratio;
     const auto more = static_cast<double>(out.rounds.size() - 1);
     out.seconds = plan_.seconds + more * (build.seconds - build.kept_seconds) + pictures;
     for (const auto& raises : raises_) out.seconds += forecaster_.repair_seconds(raises);
-    const IntegerLattice lattice =
-        choose_lattice(forecaster_.stored(), storage,
-                       most_rounding(from_world(plan_.epsilon_abs, forecaster_.units()),
-                                     plan_.layout.levels == Levels::anisotropic),
-                       forecaster_.units().density(), filters_);
     out.bytes =
         static_cast<std::uint64_t>(out.samples_ratio * static_cast<double>(plan_.grid.sample_count())) *
-        bytes_of(lattice.base);
+        bytes_of(forecaster_.lattice(plan_, storage, filters_).base);
     const auto tiles = [&](std::uint64_t bytes) {
       return memory_of_tiles(bytes, state_.memory.limit(), state_.info.is_gpu);
     };
