@@ -7,7 +7,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <utility>
 
 #include "host/base/system/casts.hpp"
 #include "host/certify/forecaster.hpp"

@@ -8,7 +8,6 @@
 #include <chrono>
 #include <cmath>
 #include <functional>
-#include <future>
 #include <optional>
 
 #include "host/base/opencl/host_memory.hpp"

@@ -1,8 +1,6 @@
 // Reconstruction of scans of either beam, in their users' units.
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "host/base/opencl/host_memory.hpp"
 #include "host/field/fbp/coverage.hpp"
 #include "host/field/fbp/reconstruct.hpp"

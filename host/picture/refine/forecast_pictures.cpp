@@ -1,6 +1,5 @@
 // Rounds of refinement without a build: pictures of F within the bounds that bricks are foreseen to have.
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <limits>

@@ -5,12 +5,10 @@
 #include <fmt/format.h>
 #include <fnmatch.h>
 
-#include <algorithm>
 #include <memory>
 #include <set>
 #include <tuple>
 
-#include "host/base/system/limits.hpp"
 #include "host/files/io/raster_file.hpp"
 #include "host/files/io/tiff.hpp"
 #include "host/scan/geometry/circular_geometry.hpp"

@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <vector>
 
 #include "host/base/system/casts.hpp"
 #include "host/verify/witness/lagrange.hpp"

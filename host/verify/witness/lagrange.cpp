@@ -2,7 +2,6 @@
 #include "host/verify/witness/lagrange.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
