@@ -168,7 +168,8 @@ Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Ups
 void reconstruct_parallel(opencl::State& state, const ScanInUnits& from, const Grid& grid,
                           const ReconstructOptions& options, const Planes& planes, const Progress& progress,
                           StageWatch& watch) {
-  const auto& [scan, largest, units] = from;
+  const ProjectionSet& scan = from.scan;
+  const Units& units = from.units;
   // Without upsampling the filtered scan need not pass through the host. It does as soon as one slab needs
   // it.
   std::optional<DirectFilter> direct;
