@@ -18,7 +18,6 @@
 #include "host/certify/crew/crew.hpp"
 #include "host/certify/fill_certificate.hpp"
 #include "host/certify/gold/gold_batch.hpp"
-#include "host/certify/gold/prepared_scan.hpp"
 #include "host/certify/plan_parts.hpp"
 #include "host/certify/sampler_share.hpp"
 #include "host/field/fbp/reconstruct.hpp"
@@ -300,20 +299,77 @@ Judged judged_volume(const Inputs& in, const std::vector<float>& base, const Int
   return close_and_measure(in, *test, bricks, tolerance, judge);
 }
 
-// The plan's own, where it is of this scan.
-std::shared_ptr<PreparedScan> preparation_of(opencl::State& state, const ScanInUnits& from, const Plan& plan,
-                                             const Progress& progress) {
-  if (plan.prepared && plan.prepared->of == PreparedOf(state, from, plan.field)) return plan.prepared;
-  // Six taps need values alone.
-  const auto sups = plan.rates.interpolation == Interpolation::six_taps ? PreparedScan::Sups::of_values
-                                                                        : PreparedScan::Sups::of_derivatives;
-  return std::make_shared<PreparedScan>(state, from, plan.field, sups, progress);
-}
+// The volume that will do: made once, or again for what was asked of bricks, where the base rounds too much,
+// or where the texture unit takes too much.
+struct VolumeMaker {
+  const Inputs& in;
+  Device& device;
+  const ProjectionSet& scan;
+  const FilteredScan& filtered;
+  const BuildOptions& options;
+  const std::optional<BuildShare>& share;
+  const std::vector<float>& base;
+  const IntegerLattice& lattice;
+  SamplerShare& samplers;
+  BrickRefinement* refinement;  // none: one tolerance holds for all
+  double epsilon_abs;
 
-void count_inputs(HostMemory& host, const ProjectionSet& scan, const Plan& plan) {
-  host.count(scan.data.resident_bytes(), "the projections, as read,");
-  host.count(4 * plan.base.samples.size(), "the base samples");
-}
+  Judged make() {
+    try {
+      return in_integers_or_not();
+    } catch (const ToleranceError&) {
+      if (!samplers.raised_for_image3d()) throw;
+      samplers.give_up_image3d();
+      return in_integers_or_not();
+    }
+  }
+
+ private:
+  Judged in_integers_or_not() {
+    try {
+      return made_on(lattice);
+    } catch (const NoRoomForImage3d&) {
+      throw;
+    } catch (const ToleranceError&) {
+      // Rounding can take what slack leaves at the gold rate, where nothing finer is left.
+      if (!(lattice.step > 0) || options.storage != StorageChoice::automatic || share) throw;
+      return made_on(lattice_of(base, in.plan.epsilon_abs, in.plan.layout, in.units, StorageChoice::f32, {}));
+    }
+  }
+
+  // Bricks are classified anew for what is asked of them: repair would raise them a level at a time.
+  Judged made_on(const IntegerLattice& integers) {
+    for (;;) {
+      NodeTolerance tolerance = samplers.begin();
+      if (refinement) tolerance.lower_to(refinement->with_bricks(tolerance.of_all));
+      Judged made = judged_volume(
+          in, base, integers, tolerance, [&](const Measured& m) { return judge(m); }, share);
+      if (!made.verdict.refined && !samplers.anew()) return made;
+    }
+  }
+
+  Verdict judge(const Measured& measured) {
+    const SamplerTerms sampler = samplers.of(measured.volume);
+    Verdict verdict{fill_certificate(in, device, scan, filtered, options, measured, sampler, epsilon_abs)};
+    const double rest = samplers.beside_nodes(sampler);
+    const bool by_brick = refinement && refinement->knows_bricks();
+    const bool asked =
+        refinement && refinement->asks(measured.volume, verdict.certificate, rest,
+                                       samplers.first_tolerance(in.plan.epsilon_abs) / (by_brick ? 2 : 1));
+    // What is known from the start only changes by what samplers were measured to take: little, of few
+    // bricks.
+    if (asked && by_brick) {
+      verdict.smaller = refinement->with_bricks(samplers.now());
+    } else if (asked) {
+      verdict.refined = true;
+    } else {
+      verdict.smaller = samplers.smaller(verdict.certificate, measured.bricks);
+      if (verdict.smaller && refinement)
+        verdict.smaller->lower_to(refinement->with_bricks(verdict.smaller->of_all));
+    }
+    return verdict;
+  }
+};
 
 // The scan filtered, gold at the plan's rates, then the volume: once, or again where the base rounds too
 // much. All but the scan, and what is thrown, in its units.
@@ -326,7 +382,8 @@ BuildResult build_in_units(Device& device, const ScanInUnits& of_scan, Plan plan
   BuildResult result;
   Stopwatch watch(result.seconds);
   HostMemory host(state);
-  count_inputs(host, scan, plan);
+  host.count(scan.data.resident_bytes(), "the projections, as read,");
+  host.count(4 * plan.base.samples.size(), "the base samples");
   const std::vector<std::uint8_t> selected = bricks_of(options.roi, plan.grid, plan.layout.granularity);
   if (std::find(selected.begin(), selected.end(), 1) == selected.end())
     throw InputError("`roi` meets no brick of the grid");
@@ -373,56 +430,13 @@ BuildResult build_in_units(Device& device, const ScanInUnits& of_scan, Plan plan
                       samplers.first_tolerance(plan.epsilon_abs));
   records.begin(
       journal_head(kinds, scan, plan, digest, options, gold.fine(), samplers.first_tolerance(epsilon_abs)));
-  const Judge judge = [&](const Measured& measured) {
-    const SamplerTerms sampler = samplers.of(measured.volume);
-    Verdict verdict{fill_certificate(in, device, scan, filtered, options, measured, sampler, epsilon_abs)};
-    const double rest = samplers.beside_nodes(sampler);
-    const bool asked =
-        refinement && refinement->asks(measured.volume, verdict.certificate, rest,
-                                       samplers.first_tolerance(plan.epsilon_abs) / (by_brick ? 2 : 1));
-    // What is known from the start only changes by what samplers were measured to take: little, of few
-    // bricks.
-    if (asked && by_brick) {
-      verdict.smaller = refinement->with_bricks(samplers.now());
-    } else if (asked) {
-      verdict.refined = true;
-    } else {
-      verdict.smaller = samplers.smaller(verdict.certificate, measured.bricks);
-      if (verdict.smaller && refinement)
-        verdict.smaller->lower_to(refinement->with_bricks(verdict.smaller->of_all));
-    }
-    return verdict;
-  };
-  // Bricks are classified anew for what is asked of them: repair would raise them a level at a time.
-  const auto volume_on = [&](const IntegerLattice& lattice) {
-    for (;;) {
-      NodeTolerance tolerance = samplers.begin();
-      if (refinement) tolerance.lower_to(refinement->with_bricks(tolerance.of_all));
-      Judged made = judged_volume(in, base, lattice, tolerance, judge, share);
-      if (!made.verdict.refined && !samplers.anew()) return made;
-    }
-  };
-  const auto volume_in_integers_or_not = [&] {
-    try {
-      return volume_on(settings.lattice);
-    } catch (const NoRoomForImage3d&) {
-      throw;
-    } catch (const ToleranceError&) {
-      // Rounding can take what slack leaves at the gold rate, where nothing finer is left.
-      if (!(settings.lattice.step > 0) || options.storage != StorageChoice::automatic || share) throw;
-      return volume_on(lattice_of(base, plan.epsilon_abs, plan.layout, units, StorageChoice::f32, {}));
-    }
-  };
-  const auto with_image3d_or_not = [&] {
-    try {
-      return volume_in_integers_or_not();
-    } catch (const ToleranceError&) {
-      if (!samplers.raised_for_image3d()) throw;
-      samplers.give_up_image3d();
-      return volume_in_integers_or_not();
-    }
-  };
-  Judged made = with_image3d_or_not();
+  Judged made = VolumeMaker{in,         device,
+                            scan,       filtered,
+                            options,    share,
+                            base,       settings.lattice,
+                            samplers,   refinement ? &*refinement : nullptr,
+                            epsilon_abs}
+                    .make();
   result.volume = std::move(made.volume);
   result.certificate = std::move(made.verdict.certificate);
   if (crew) {

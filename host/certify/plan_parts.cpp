@@ -1,6 +1,5 @@
 #include "host/certify/plan_parts.hpp"
 
-#include "host/certify/gold/gold_source.hpp"
 #include "host/volume/result_units.hpp"
 
 namespace vdvr {
@@ -38,6 +37,15 @@ IntegerLattice lattice_of(std::span<const float> base, double epsilon_abs, const
                           const Units& units, StorageChoice storage, const FilterErrors& filters) {
   return choose_lattice(base, storage, most_rounding(epsilon_abs, layout.levels == Levels::anisotropic),
                         units.density(), filters);
+}
+
+std::shared_ptr<PreparedScan> preparation_of(opencl::State& state, const ScanInUnits& from, const Plan& plan,
+                                             const Progress& progress) {
+  if (plan.prepared && plan.prepared->of == PreparedOf(state, from, plan.field)) return plan.prepared;
+  // Six taps need values alone.
+  const auto sups = plan.rates.interpolation == Interpolation::six_taps ? PreparedScan::Sups::of_values
+                                                                        : PreparedScan::Sups::of_derivatives;
+  return std::make_shared<PreparedScan>(state, from, plan.field, sups, progress);
 }
 
 }  // namespace vdvr
