@@ -4,7 +4,6 @@
 #include <mpi.h>
 
 #include <chrono>
-#include <deque>
 #include <filesystem>
 #include <list>
 #include <map>

@@ -1,9 +1,6 @@
 // Uniform FDK on the device.
 #pragma once
 
-#include <cstdint>
-#include <functional>
-
 #include "host/base/opencl/state.hpp"
 #include "host/field/fbp/filter_projections.hpp"
 #include "host/field/fbp/whole_volume.hpp"

@@ -2,7 +2,6 @@
 // by field_bounds.cpp and verify_field.cpp; nothing of build uses them.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
