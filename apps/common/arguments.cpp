@@ -114,6 +114,11 @@ Arguments& Arguments::values(const std::string& name, const std::string& shape, 
   return *this;
 }
 
+Arguments& Arguments::hidden(const std::string& name, const std::string& shape) {
+  hidden_.add_options()(name.c_str(), po::value<std::string>()->value_name(shape));
+  return *this;
+}
+
 Arguments& Arguments::positional(const std::string& name, const std::string& help) {
   hidden_.add_options()(name.c_str(), po::value<std::string>(), help.c_str());
   positionals_.add(name.c_str(), 1);
@@ -291,9 +296,10 @@ std::optional<std::vector<std::int64_t>> Arguments::sizes(const std::string& nam
 
 std::string Arguments::choice(const std::string& name, const std::string& fallback) const {
   if (!has(name)) return fallback;
+  const auto* declared = hidden_.find_nothrow(name, /*approx=*/false);
   for (const auto& g : groups_)
-    if (const auto* declared = g.find_nothrow(name, /*approx=*/false))
-      return choice(name, split(declared->semantic()->name(), '|'), fallback);
+    if (!declared) declared = g.find_nothrow(name, /*approx=*/false);
+  if (declared) return choice(name, split(declared->semantic()->name(), '|'), fallback);
   throw std::logic_error("choice: --" + name + " is not declared");
 }
 

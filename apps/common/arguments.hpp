@@ -32,6 +32,8 @@ class Arguments {
                            const std::string& help);
   /// The same, which may be given several times; read by texts().
   Arguments& values(const std::string& name, const std::string& shape, const std::string& help);
+  /// As value(), but told by neither --help nor man pages nor completion: for comparisons, in the documents.
+  Arguments& hidden(const std::string& name, const std::string& shape);
   /// The next stray word; all positionals are required.
   Arguments& positional(const std::string& name, const std::string& help);
 

@@ -4,7 +4,6 @@
 #include <mpi.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <exception>
@@ -114,7 +113,7 @@ int follow_render(MpiMessenger& messenger, std::vector<std::string> words) {
 int follow(MpiMessenger& messenger, const std::vector<std::string>& words) {
   try {
     if (!words.empty() && words[0] == "render") return follow_render(messenger, words);
-    serve(messenger);
+    join_crew(messenger);
     return 0;
   } catch (const std::exception& e) {
     say(fmt::format("vdvr-mpi, rank {}: {}\n", messenger.rank(), e.what()));

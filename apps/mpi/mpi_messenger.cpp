@@ -264,8 +264,8 @@ void MpiMessenger::hear_of_files() {
   }
 }
 
-std::uint64_t MpiMessenger::share(std::span<const std::byte> bytes) {
-  const std::uint64_t number = ++shares_;
+std::uint64_t MpiMessenger::lend(std::span<const std::byte> bytes) {
+  const std::uint64_t number = ++lent_;
   std::vector<int> heads;
   for (int rank = 0; rank < size_; ++rank) {
     const int head = heads_[static_cast<std::size_t>(rank)];
@@ -289,8 +289,7 @@ std::uint64_t MpiMessenger::share(std::span<const std::byte> bytes) {
   return number;
 }
 
-std::pair<std::span<const std::byte>, std::shared_ptr<const void>> MpiMessenger::shared(
-    std::uint64_t number) {
+std::pair<std::span<const std::byte>, std::shared_ptr<const void>> MpiMessenger::lent(std::uint64_t number) {
   while (!files_.contains(number) || !files_.at(number).whole) {
     throw_if_stopped();
     progress();

@@ -4,7 +4,6 @@
 #include <mpi.h>
 
 #include <chrono>
-#include <deque>
 #include <filesystem>
 #include <list>
 #include <map>
@@ -31,8 +30,8 @@ class MpiMessenger final : public Messenger {
   [[nodiscard]] int neighbours() const override { return static_cast<int>(machine_.size()); }
   void send(int to, std::vector<std::byte> message) override;
   std::optional<std::pair<int, std::vector<std::byte>>> receive(std::chrono::milliseconds wait) override;
-  std::uint64_t share(std::span<const std::byte> bytes) override;
-  std::pair<std::span<const std::byte>, std::shared_ptr<const void>> shared(std::uint64_t number) override;
+  std::uint64_t lend(std::span<const std::byte> bytes) override;
+  std::pair<std::span<const std::byte>, std::shared_ptr<const void>> lent(std::uint64_t number) override;
   CommonMemory common(std::uint64_t number, std::uint64_t bytes) override;
   [[nodiscard]] bool is_gone(int process) const override;
   void give_up(int process) override;
@@ -87,7 +86,7 @@ class MpiMessenger final : public Messenger {
   std::list<Sending> sending_;
   std::map<std::uint64_t, File> files_;
   std::map<std::uint64_t, Common> commons_;
-  std::uint64_t shares_ = 0;
+  std::uint64_t lent_ = 0;
 };
 
 }  // namespace vdvr::cli

@@ -49,7 +49,7 @@ Case build_case(Device& device, const ProjectionSet& scan, const Grid& grid, con
   RateOptions rates;
   PlanSettings plan_settings;
   BuildOptions build_options;
-  plan_settings.foresee = false;
+  plan_settings.forecast = false;
   build_options.window = options.window;
   if (options.absolute) {
     c.tolerance.absolute = options.epsilon;

@@ -5,8 +5,6 @@
 
 #include <functional>
 #include <optional>
-#include <string>
-#include <vector>
 
 #include "apps/paper/error_measure.hpp"
 #include "apps/paper/fields.hpp"

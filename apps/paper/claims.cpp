@@ -2,7 +2,6 @@
 // are computed from the JSON of the other sections; reasons are given where a claim does not hold.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 

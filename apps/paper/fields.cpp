@@ -1,6 +1,5 @@
 #include "apps/paper/fields.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 #include "apps/paper/parallel_rows.hpp"

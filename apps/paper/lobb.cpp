@@ -1,7 +1,6 @@
 // Table 2 and Figs. 11, 12, 13 and 15: Marschner-Lobb.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 

@@ -164,7 +164,7 @@ void add_spectra(Report& run, const ProjectionSet& scan, const Grid& grid, const
 
   const Plan plan = [&] {
     PlanSettings settings;
-    settings.foresee = false;
+    settings.forecast = false;
     settings.comparison.terms = Terms::grid;
     Tolerance tolerance;
     tolerance.relative = 0.03;

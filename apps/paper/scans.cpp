@@ -1,7 +1,6 @@
 #include "apps/paper/scans.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace vdvr::paper {
 namespace {

@@ -2,7 +2,6 @@
 // view and of its 1x volume. Called by projections.cpp.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>

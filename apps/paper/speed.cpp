@@ -1,7 +1,6 @@
 // Pictures per second of certified volumes, uniform ones and D2VR, object by object, in one run.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "apps/paper/report.hpp"

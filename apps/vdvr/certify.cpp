@@ -91,7 +91,7 @@ void add_certify_options(Arguments& args) {
 
 Wanted wanted_to_certify(const Arguments& args, bool may_choose_tolerance) {
   Wanted wanted = wanted_of(args, may_choose_tolerance);
-  wanted.options.plan.foresee = false;
+  wanted.options.plan.forecast = false;
   wanted.compression = compression(args);
   return wanted;
 }

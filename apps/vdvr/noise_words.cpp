@@ -44,12 +44,12 @@ std::optional<FieldNoise> noise_of_plan(Device& device, const Planned& planned, 
   out.sigma = planned.made.sigma->range;
   out.sigmas = planned.made.asked.sigmas;
   out.split = split_of_views(device, planned.scan, plan.field, planned.noise.noise->model, progress);
-  out.forecasts = foresee_in_sigma(plan, *planned.made.sigma, multiples);
+  out.forecasts = forecast_in_sigma(plan, *planned.made.sigma, multiples);
   out.rings = ring_noise(planned.scan, planned.understood.flats);
   if (compared)
     out.filters =
-        foresee_filters(device, planned.scan, Tolerance{{}, plan.epsilon_abs}, planned.made.asked.sigmas,
-                        *planned.noise.noise, compared->options, progress);
+        forecast_filters(device, planned.scan, Tolerance{{}, plan.epsilon_abs}, planned.made.asked.sigmas,
+                         *planned.noise.noise, compared->options, progress);
   return out;
 }
 

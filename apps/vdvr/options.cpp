@@ -241,20 +241,15 @@ void add_build(Arguments& args) {
           "base", "auto|NxNxN",
           "cells of the grid per base sample in x, y, z: 1, 2, 4 or 8 each (default auto: what stores least)")
       .value("window", "LO,HI", "test only where the field meets these values")
-      .value("closing", "coarse|paper|none",
-             "how bricks of different levels meet (default coarse; none is for comparison, never certified)")
-      .value("coefficients", "midrange|sampled",
-             "samples fitted to the trilinear filter, or F at the nodes (default midrange)")
-      .value("levels", "isotropic|anisotropic",
-             "one level per brick, or one per axis of a brick (default anisotropic)")
       .value("storage", "auto|f32|u16|u8", "sample type of base and tiles (default auto)")
-      .value("terms", "all|grid",
-             "error terms that are charged (default all; grid is for comparison, never certified)")
-      .value("epsilon-of", "range|max", "what --epsilon is a fraction of (default range)")
-      .flag("paper",
-            "the paper's settings, for comparison: --closing paper --coefficients sampled --granularity 4 "
-            "--upsampling 8 --u-filter linear --gold 8 --terms grid --epsilon-of max, each unless given")
-      .flag("resume", "continue what an interrupted build or run left in its journal");
+      .flag("paper", "the paper's settings, for comparison (docs/paper.md)")
+      .flag("resume", "continue what an interrupted build or run left in its journal")
+      // Of what `paper` stands for, one by one (docs/paper.md).
+      .hidden("closing", "coarse|paper|none")
+      .hidden("coefficients", "midrange|sampled")
+      .hidden("levels", "isotropic|anisotropic")
+      .hidden("terms", "all|grid")
+      .hidden("epsilon-of", "range|max");
 }
 
 BuildOptions build_options(const Arguments& args) {

@@ -6,7 +6,6 @@
 #include <map>
 #include <set>
 
-#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "apps/common/messages.hpp"

@@ -10,9 +10,9 @@ namespace vdvr::cli {
 std::optional<PictureForecast> picture_forecast(Device& device, const Planned& planned, const Wanted& wanted,
                                                 const Progress& progress) {
   if (!planned.made.pictures) return std::nullopt;
-  return foresee_pictures(device, planned.scan, planned.made.plan, planned.made.asked.pictures->views,
-                          planned.made.refinement_options(), planned.made.everywhere_abs(),
-                          wanted.options.build.storage, progress);
+  return forecast_pictures(device, planned.scan, planned.made.plan, planned.made.asked.pictures->views,
+                           planned.made.refinement_options(), planned.made.everywhere_abs(),
+                           wanted.options.build.storage, progress);
 }
 
 Json forecast_json(const PictureForecast& f, const Plan& plan) {

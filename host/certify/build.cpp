@@ -18,8 +18,7 @@
 #include "host/certify/crew/crew.hpp"
 #include "host/certify/fill_certificate.hpp"
 #include "host/certify/gold/gold_batch.hpp"
-#include "host/certify/gold/prepared_scan.hpp"
-#include "host/certify/plan_units.hpp"
+#include "host/certify/plan_parts.hpp"
 #include "host/certify/sampler_share.hpp"
 #include "host/field/fbp/reconstruct.hpp"
 #include "host/volume/bricks.hpp"
@@ -74,14 +73,6 @@ FilterErrors filters_of(const std::vector<Crew::Kind>& kinds) {
   return worst;
 }
 
-// Of integer samples.
-IntegerLattice lattice_of(const std::vector<float>& base, const Plan& plan, const Units& units,
-                          StorageChoice storage, const FilterErrors& filters) {
-  return choose_lattice(base, storage,
-                        most_rounding(plan.epsilon_abs, plan.layout.levels == Levels::anisotropic),
-                        units.density(), filters);
-}
-
 MemoryBudget memory_budget_of(const opencl::State& state, const ProjectionSet& scan,
                               const BuildOptions& options) {
   const std::uint64_t share = state.memory.limit() / 8;
@@ -92,24 +83,6 @@ MemoryBudget memory_budget_of(const opencl::State& state, const ProjectionSet& s
         std::make_shared<Scratch>(options.scratch.empty() ? default_scratch_folder() : options.scratch,
                                   std::max(share, least_resident));
   return budget;
-}
-
-GoldSettings gold_settings(const Plan& plan, const BuildOptions& options, const IntegerLattice& lattice,
-                           bool cone) {
-  const Comparison& comparison = plan.settings.comparison;
-  GoldSettings settings{plan.grid,
-                        plan.layout.granularity,
-                        plan.rates.gold,
-                        plan.rates.upsampling,
-                        plan.rates.interpolation,
-                        options.window};
-  settings.midrange = comparison.coefficients != Coefficients::sampled;
-  settings.anisotropic = plan.layout.levels == Levels::anisotropic && comparison.closing != Closing::paper;
-  settings.grid_only = comparison.terms == Terms::grid;
-  settings.coarsening = plan.layout.coarsening;
-  settings.lattice = lattice;
-  if (cone) settings.least_reach = reach_of_all(settings);
-  return settings;
 }
 
 OpenBricks open_bricks(const Plan& plan, const std::vector<float>& base, const IntegerLattice& lattice,
@@ -236,8 +209,18 @@ std::uint64_t memory_bytes(const MixedVolume& volume) {
   return bytes;
 }
 
-// Whether a measured volume will do; else the smaller tolerance that it is brought within.
-using Accept = std::function<std::optional<NodeTolerance>(const Measured&)>;
+// What a measured volume is certified for, and whether that will do.
+struct Verdict {
+  Certificate certificate{};
+  std::optional<NodeTolerance> smaller{};  // what it is to be brought within
+  bool refined = false;                    // bricks are to be classified anew, for what was asked of them
+};
+using Judge = std::function<Verdict(const Measured&)>;
+
+struct Judged {
+  MixedVolume volume{};
+  Verdict verdict{};
+};
 
 // Those that a smaller tolerance may ask more of than the one they were measured with.
 std::vector<std::uint8_t> bricks_above(const std::vector<BrickMeasure>& measures,
@@ -248,9 +231,9 @@ std::vector<std::uint8_t> bricks_above(const std::vector<BrickMeasure>& measures
   return above;
 }
 
-// Closes, packs, measures; raises bricks until every node is within the tolerance, and the volume accepted.
-Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& bricks,
-                           NodeTolerance tolerance, const Accept& accept) {
+// Closes, packs, measures; raises bricks until every node is within the tolerance, and no smaller one asked.
+Judged close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& bricks, NodeTolerance tolerance,
+                         const Judge& judge) {
   // Bricks that stay at level 0 were measured on the base samples while classifying, and closing does not
   // change those.
   std::vector<std::uint8_t> pending(bricks.level.size());
@@ -285,10 +268,10 @@ Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& b
       out.volume = std::move(volume);
       out.bricks = test.measures();
       out.slack = test.bounds();
-      std::optional<NodeTolerance> smaller = accept(out);
-      if (!smaller) return out;
+      Verdict verdict = judge(out);
+      if (!verdict.smaller) return {std::move(out.volume), std::move(verdict)};
       volume = std::move(out.volume);
-      tolerance = std::move(*smaller);
+      tolerance = std::move(*verdict.smaller);
       test.measure(field, volume.level, tolerance, bricks_above(test.measures(), tolerance), "repair");
       in.watch.lap("verify");
     }
@@ -299,9 +282,9 @@ Measured close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& b
 }
 
 // The volume of these base samples within the tolerance; of a share, what it classifies, and no volume.
-Measured measured_volume(const Inputs& in, const std::vector<float>& base, const IntegerLattice& lattice,
-                         const NodeTolerance& tolerance, const Accept& accept,
-                         const std::optional<BuildShare>& share) {
+Judged judged_volume(const Inputs& in, const std::vector<float>& base, const IntegerLattice& lattice,
+                     const NodeTolerance& tolerance, const Judge& judge,
+                     const std::optional<BuildShare>& share) {
   HostMemory tiles(in.state);
   tiles.count(4 * base.size(), "the base samples, rounded,");
   OpenBricks bricks = open_bricks(in.plan, base, lattice, in.budget);
@@ -313,41 +296,105 @@ Measured measured_volume(const Inputs& in, const std::vector<float>& base, const
       bricks.tolerance.push_back(static_cast<float>(tolerance.of(i)));
   classify(in, *test, bricks, tolerance, share.value_or(BuildShare{}));
   if (share) return {};
-  return close_and_measure(in, *test, bricks, tolerance, accept);
+  return close_and_measure(in, *test, bricks, tolerance, judge);
 }
 
-void count_inputs(HostMemory& host, const ProjectionSet& scan, const Plan& plan) {
-  host.count(scan.data.resident_bytes(), "the projections, as read,");
-  host.count(4 * plan.base.samples.size(), "the base samples");
-}
+// The volume that will do: made once, or again for what was asked of bricks, where the base rounds too much,
+// or where the texture unit takes too much.
+struct VolumeMaker {
+  const Inputs& in;
+  Device& device;
+  const ProjectionSet& scan;
+  const FilteredScan& filtered;
+  const BuildOptions& options;
+  const std::optional<BuildShare>& share;
+  const std::vector<float>& base;
+  const IntegerLattice& lattice;
+  SamplerShare& samplers;
+  BrickRefinement* refinement;  // none: one tolerance holds for all
+  double epsilon_abs;
+
+  Judged make() {
+    try {
+      return in_integers_or_not();
+    } catch (const ToleranceError&) {
+      if (!samplers.raised_for_image3d()) throw;
+      samplers.give_up_image3d();
+      return in_integers_or_not();
+    }
+  }
+
+ private:
+  Judged in_integers_or_not() {
+    try {
+      return made_on(lattice);
+    } catch (const NoRoomForImage3d&) {
+      throw;
+    } catch (const ToleranceError&) {
+      // Rounding can take what slack leaves at the gold rate, where nothing finer is left.
+      if (!(lattice.step > 0) || options.storage != StorageChoice::automatic || share) throw;
+      return made_on(lattice_of(base, in.plan.epsilon_abs, in.plan.layout, in.units, StorageChoice::f32, {}));
+    }
+  }
+
+  // Bricks are classified anew for what is asked of them: repair would raise them a level at a time.
+  Judged made_on(const IntegerLattice& integers) {
+    for (;;) {
+      NodeTolerance tolerance = samplers.begin();
+      if (refinement) tolerance.lower_to(refinement->with_bricks(tolerance.of_all));
+      Judged made = judged_volume(
+          in, base, integers, tolerance, [&](const Measured& m) { return judge(m); }, share);
+      if (!made.verdict.refined && !samplers.anew()) return made;
+    }
+  }
+
+  Verdict judge(const Measured& measured) {
+    const SamplerTerms sampler = samplers.of(measured.volume);
+    Verdict verdict{fill_certificate(in, device, scan, filtered, options, measured, sampler, epsilon_abs)};
+    const double rest = samplers.beside_nodes(sampler);
+    const bool by_brick = refinement && refinement->knows_bricks();
+    const bool asked =
+        refinement && refinement->asks(measured.volume, verdict.certificate, rest,
+                                       samplers.first_tolerance(in.plan.epsilon_abs) / (by_brick ? 2 : 1));
+    // What is known from the start only changes by what samplers were measured to take: little, of few
+    // bricks.
+    if (asked && by_brick) {
+      verdict.smaller = refinement->with_bricks(samplers.now());
+    } else if (asked) {
+      verdict.refined = true;
+    } else {
+      verdict.smaller = samplers.smaller(verdict.certificate, measured.bricks);
+      if (verdict.smaller && refinement)
+        verdict.smaller->lower_to(refinement->with_bricks(verdict.smaller->of_all));
+    }
+    return verdict;
+  }
+};
 
 // The scan filtered, gold at the plan's rates, then the volume: once, or again where the base rounds too
-// much. All but the scan, and what is thrown, in `units`.
-BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Units& units, Plan plan,
-                           const BuildOptions& options, const std::optional<BuildShare>& share,
-                           const Progress& progress) {
+// much. All but the scan, and what is thrown, in its units.
+BuildResult build_in_units(Device& device, const ScanInUnits& of_scan, Plan plan, const BuildOptions& options,
+                           const std::optional<BuildShare>& share, const Progress& progress) {
   opencl::State& state = device.state();
+  const ProjectionSet& scan = of_scan.scan;
+  const Units& units = of_scan.units;
   require_trusted(device, "certifying a volume");
   BuildResult result;
   Stopwatch watch(result.seconds);
   HostMemory host(state);
-  count_inputs(host, scan, plan);
+  host.count(scan.data.resident_bytes(), "the projections, as read,");
+  host.count(4 * plan.base.samples.size(), "the base samples");
   const std::vector<std::uint8_t> selected = bricks_of(options.roi, plan.grid, plan.layout.granularity);
   if (std::find(selected.begin(), selected.end(), 1) == selected.end())
     throw InputError("`roi` meets no brick of the grid");
 
-  // Six taps need values alone.
-  const bool prepared = plan.prepared && plan.prepared->is_of(state, scan, plan.field, units);
-  const auto from = prepared
-                        ? plan.prepared
-                        : std::make_shared<PreparedScan>(state, scan, plan.field, units,
-                                                         plan.rates.interpolation == Interpolation::six_taps
-                                                             ? PreparedScan::Sups::of_values
-                                                             : PreparedScan::Sups::of_derivatives,
-                                                         progress);
+  const std::shared_ptr<PreparedScan> from = preparation_of(state, of_scan, plan, progress);
   const FilteredScan& filtered = from->filtered;
   watch.lap("filter");
-  GoldSettings settings = gold_settings(plan, options, {}, scan.cone.has_value());
+  GoldSettings settings = gold_settings(plan, plan.rates, scan.cone.has_value());
+  settings.window = options.window;
+  // That closing knows no levels per axis.
+  if (plan.settings.comparison.closing == Closing::paper) settings.anisotropic = false;
   std::optional<Crew> crew;
   const bool all = 2 * std::count(selected.begin(), selected.end(), 1) > std::ssize(selected);
   if (!options.crew.alone()) crew.emplace(device, *from, settings, options.crew, all);
@@ -360,7 +407,8 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
   const std::vector<Crew::Kind> kinds =
       crew ? crew->kinds() : std::vector<Crew::Kind>{{device.info(), probe_filters(device), 0}};
   watch.lap("probe");
-  settings.lattice = lattice_of(base, plan, units, options.storage, filters_of(kinds));
+  settings.lattice =
+      lattice_of(base, plan.epsilon_abs, plan.layout, units, options.storage, filters_of(kinds));
   GoldRates gold(state, filtered, from->sups, settings, from->source(settings));
   BlockRecords records(options.journal, options.parts);
   JournalledRates journalled(gold, &records, others);
@@ -382,51 +430,15 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
                       samplers.first_tolerance(plan.epsilon_abs));
   records.begin(
       journal_head(kinds, scan, plan, digest, options, gold.fine(), samplers.first_tolerance(epsilon_abs)));
-  bool refined = false;
-  const Accept accept = [&](const Measured& measured) -> std::optional<NodeTolerance> {
-    const SamplerTerms sampler = samplers.of(measured.volume);
-    result.certificate =
-        fill_certificate(in, device, scan, filtered, options, measured, sampler, epsilon_abs);
-    const double rest = samplers.beside_nodes(sampler);
-    const bool asked =
-        refinement && refinement->asks(measured.volume, result.certificate, rest,
-                                       samplers.first_tolerance(plan.epsilon_abs) / (by_brick ? 2 : 1));
-    // What is known from the start only changes by what samplers were measured to take: little, of few
-    // bricks.
-    if (asked && by_brick) return refinement->with_bricks(samplers.now());
-    refined = asked;
-    if (refined) return std::nullopt;
-    std::optional<NodeTolerance> less = samplers.smaller(result.certificate, measured.bricks);
-    if (less && refinement) less->lower_to(refinement->with_bricks(less->of_all));
-    return less;
-  };
-  // Bricks are classified anew for what is asked of them: repair would raise them a level at a time.
-  const auto volume_on = [&](const IntegerLattice& lattice) {
-    for (;;) {
-      NodeTolerance tolerance = samplers.begin();
-      if (refinement) tolerance.lower_to(refinement->with_bricks(tolerance.of_all));
-      MixedVolume volume = measured_volume(in, base, lattice, tolerance, accept, share).volume;
-      if (!refined && !samplers.anew()) return volume;
-    }
-  };
-  const auto volume_in_integers_or_not = [&] {
-    try {
-      return volume_on(settings.lattice);
-    } catch (const NoRoomForImage3d&) {
-      throw;
-    } catch (const ToleranceError&) {
-      // Rounding can take what slack leaves at the gold rate, where nothing finer is left.
-      if (!(settings.lattice.step > 0) || options.storage != StorageChoice::automatic || share) throw;
-      return volume_on(lattice_of(base, plan, units, StorageChoice::f32, {}));
-    }
-  };
-  try {
-    result.volume = volume_in_integers_or_not();
-  } catch (const ToleranceError&) {
-    if (!samplers.raised_for_image3d()) throw;
-    samplers.give_up_image3d();
-    result.volume = volume_in_integers_or_not();
-  }
+  Judged made = VolumeMaker{in,         device,
+                            scan,       filtered,
+                            options,    share,
+                            base,       settings.lattice,
+                            samplers,   refinement ? &*refinement : nullptr,
+                            epsilon_abs}
+                    .make();
+  result.volume = std::move(made.volume);
+  result.certificate = std::move(made.verdict.certificate);
   if (crew) {
     result.message_bytes = crew->bytes();
     result.message_seconds = crew->message_seconds();
@@ -437,18 +449,17 @@ BuildResult build_in_units(Device& device, const ProjectionSet& scan, const Unit
 BuildResult build_all_or_share(Device& device, const ProjectionSet& scan, Plan plan,
                                const BuildOptions& options, const std::optional<BuildShare>& share,
                                const Progress& progress) {
-  check_line_integrals(scan);
+  const ScanInUnits of_scan(scan);
   if (plan.estimated) throw InputError("a plan that was estimated from a part of the scan cannot be built");
-  const Units units = units_of(scan);
-  if (units.are_world())
-    return build_in_units(device, scan, units, std::move(plan), options, share, progress);
+  const Units& units = of_scan.units;
+  if (units.are_world()) return build_in_units(device, of_scan, std::move(plan), options, share, progress);
   const Grid grid = plan.grid;
   BuildOptions wanted = options;
   if (options.roi) wanted.roi = from_world(*options.roi, units);
   if (options.window)
     wanted.window = {from_world(options.window->first, units), from_world(options.window->second, units)};
   BuildResult result =
-      build_in_units(device, scan, units, from_world(std::move(plan), units), wanted, share, progress);
+      build_in_units(device, of_scan, from_world(std::move(plan), units), wanted, share, progress);
   if (share) return result;
   scale(result.volume, units.density());
   result.volume.grid = grid;

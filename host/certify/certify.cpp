@@ -142,7 +142,7 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Tolerance& toler
 BuildResult certify(Device& device, const ProjectionSet& scan, const Tolerance& tolerance,
                     const CertifyOptions& options, const Progress& progress) {
   CertifyOptions used = options;
-  used.plan.foresee = false;
+  used.plan.forecast = false;
   return certify(device, scan, make_plan(device, scan, tolerance, used, progress), used, progress);
 }
 

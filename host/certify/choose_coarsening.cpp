@@ -1,4 +1,4 @@
-// Foresees the storage of every coarsening on some patches of bricks.
+// Forecasts the storage of every coarsening on some patches of bricks.
 #include "host/certify/choose_coarsening.hpp"
 
 #include <algorithm>
@@ -50,9 +50,9 @@ struct Patch {
   }
 };
 
-class Foresee {
+class StorageForecast {
  public:
-  Foresee(const Volume& base, const std::vector<std::uint8_t>& covered, const CoarseningQuestion& q)
+  StorageForecast(const Volume& base, const std::vector<std::uint8_t>& covered, const CoarseningQuestion& q)
       : base_(base),
         covered_(covered),
         q_(q),
@@ -242,15 +242,15 @@ bool is_possible(const LevelTriple& c, const Grid& grid, int granularity, int ra
 
 LevelTriple choose_coarsening(const Volume& base, const std::vector<std::uint8_t>& covered,
                               const CoarseningQuestion& q) {
-  const Foresee foresee(base, covered, q);
-  if (foresee.knows_nothing()) return {};
+  const StorageForecast forecast(base, covered, q);
+  if (forecast.knows_nothing()) return {};
   LevelTriple best{}, c{};
-  double fewest = (1 - worth) * foresee.samples(best);
+  double fewest = (1 - worth) * forecast.samples(best);
   for (c[0] = 0; c[0] <= 3; ++c[0])
     for (c[1] = 0; c[1] <= 3; ++c[1])
       for (c[2] = 0; c[2] <= 3; ++c[2]) {
         if (c == LevelTriple{0, 0, 0} || !is_possible(c, base.grid, q.granularity, q.rate)) continue;
-        const double n = foresee.samples(c);
+        const double n = forecast.samples(c);
         if (n >= fewest) continue;
         fewest = n;
         best = c;

@@ -6,7 +6,6 @@
 #include <numbers>
 
 #include "host/base/system/casts.hpp"
-#include "vdvr/error.hpp"
 #include "vdvr/expert/certified_region.hpp"
 #include "vdvr/expert/noise_forecast.hpp"
 #include "vdvr/expert/reconstruct.hpp"

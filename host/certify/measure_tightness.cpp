@@ -107,14 +107,14 @@ double interpolation_error(const BrickGold& fine, const BrickGold& coarse, int f
 // The largest rate of gold there is.
 constexpr int finest_gold = 32;
 
-// All but the scan in `units`.
-Tightness measure_in_units(Device& device, const ProjectionSet& scan, const Units& units, const Grid& grid,
+// All but the scan in its units.
+Tightness measure_in_units(Device& device, const ScanInUnits& from, const Grid& grid,
                            const FieldOptions& field, const Rates& rates, const Progress& progress) {
   opencl::State& state = device.state();
-  PreparedScan prepared(state, scan, field, units, PreparedScan::Sups::of_derivatives, progress);
-  const bool cone = scan.cone.has_value();
+  PreparedScan prepared(state, from, field, PreparedScan::Sups::of_derivatives, progress);
+  const bool cone = from.scan.cone.has_value();
   const auto stream_at = [&](const Rates& r) {
-    const GoldSettings settings{grid, granularity, r.gold, r.upsampling, r.interpolation, {}};
+    const GoldSettings settings = gold_settings(grid, granularity, r);
     return GoldStream(state, prepared.filtered, prepared.sups, settings, prepared.source(settings));
   };
   // Of cone beam there is one way to gold.
@@ -170,11 +170,11 @@ Tightness measure_in_units(Device& device, const ProjectionSet& scan, const Unit
 
 Tightness measure_tightness(Device& device, const ProjectionSet& scan, const Grid& grid,
                             const FieldOptions& field, const Rates& rates, const Progress& progress) {
-  const Units units = units_of(scan);
-  Tightness t = measure_in_units(device, scan, units, from_world(grid, units), field, rates, progress);
+  const ScanInUnits from(scan);
+  Tightness t = measure_in_units(device, from, from_world(grid, from.units), field, rates, progress);
   for (double* value :
        {&t.gold_bound, &t.gold_error, &t.projection_bound, &t.projection_error, &t.arithmetic})
-    *value = to_world(*value, units);
+    *value = to_world(*value, from.units);
   return t;
 }
 

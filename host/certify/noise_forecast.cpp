@@ -7,10 +7,9 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <utility>
 
 #include "host/base/system/casts.hpp"
-#include "host/certify/foresee.hpp"
+#include "host/certify/forecaster.hpp"
 #include "host/certify/gold/gold_settings.hpp"
 #include "host/volume/bricks.hpp"
 #include "vdvr/error.hpp"
@@ -19,8 +18,11 @@
 namespace vdvr {
 namespace {
 
-// What is asked of a brick lies below what is promised by more than sums in fp32 round by.
-constexpr double margin = 1 - 0x1p-18;
+// What is asked of a brick, as a density: below what is promised by more than sums in fp32 round by.
+double asked_of_brick(double multiple, double sigma) {
+  constexpr double margin = 1 - 0x1p-18;
+  return multiple * margin * sigma;
+}
 
 std::vector<std::uint8_t> seen_samples(const Volume& sigma, const ProjectionSet& scan,
                                        const FieldOptions& field) {
@@ -74,20 +76,20 @@ BrickSigma sigma_of_plan(Device& device, const ProjectionSet& scan, const Plan& 
       scan, plan.field, plan.grid, granularity);
 }
 
-std::vector<SigmaForecast> foresee_in_sigma(const Plan& plan, const BrickSigma& sigma,
-                                            std::span<const double> multiples) {
-  if (!plan.foresight || plan.estimated) return {};
-  Foresight& foresight = *plan.foresight;
+std::vector<SigmaForecast> forecast_in_sigma(const Plan& plan, const BrickSigma& sigma,
+                                             std::span<const double> multiples) {
+  if (!plan.forecaster || plan.estimated) return {};
   std::vector<SigmaForecast> out;
   for (const double multiple : multiples) {
     NodeTolerance tolerance(0, sigma.of_brick);
     for (float& brick : tolerance.by_brick) {
-      const double wanted = multiple * margin * static_cast<double>(brick) - plan.budget.arithmetic.value;
+      const double wanted =
+          asked_of_brick(multiple, static_cast<double>(brick)) - plan.budget.arithmetic.value;
       // Below what rounding takes no tolerance is within reach: such a brick counts with the plan's.
-      brick = static_cast<float>(from_world(wanted > 0 ? wanted : plan.epsilon_abs, foresight.units()));
+      brick = static_cast<float>(wanted > 0 ? wanted : plan.epsilon_abs);
       tolerance.of_all = std::max(tolerance.of_all, static_cast<double>(brick));
     }
-    if (tolerance.of_all > 0) out.push_back({multiple, foresight.foresee(tolerance).samples_ratio});
+    if (tolerance.of_all > 0) out.push_back({multiple, plan.forecaster->forecast(tolerance).samples_ratio});
   }
   return out;
 }
@@ -107,17 +109,17 @@ PlanInSigma make_plan_in_sigma(Device& device, const ProjectionSet& scan, double
                   scan, field, grid, granularity);
   CertifyOptions whole = options;
   whole.plan.estimate = false;
-  out.plan =
-      make_plan(device, scan, Tolerance{{}, multiple * margin * out.sigma.range.least}, whole, progress);
-  if (const auto foreseen = foresee_in_sigma(out.plan, out.sigma, std::array{multiple}); !foreseen.empty())
-    out.plan.samples_ratio = foreseen.front().samples_ratio;
+  out.plan = make_plan(device, scan, Tolerance{{}, asked_of_brick(multiple, out.sigma.range.least)}, whole,
+                       progress);
+  if (const auto forecast = forecast_in_sigma(out.plan, out.sigma, std::array{multiple}); !forecast.empty())
+    out.plan.samples_ratio = forecast.front().samples_ratio;
   return out;
 }
 
-std::vector<FilterForecast> foresee_filters(Device& device, const ProjectionSet& scan,
-                                            const Tolerance& tolerance, std::optional<double> multiple,
-                                            const ScanNoise& noise, const CertifyOptions& options,
-                                            const Progress& progress) {
+std::vector<FilterForecast> forecast_filters(Device& device, const ProjectionSet& scan,
+                                             const Tolerance& tolerance, std::optional<double> multiple,
+                                             const ScanNoise& noise, const CertifyOptions& options,
+                                             const Progress& progress) {
   std::vector<FilterForecast> out;
   for (const auto& [filter, name] : ramp_windows) {
     CertifyOptions with = options;
@@ -142,7 +144,7 @@ std::vector<FilterForecast> foresee_filters(Device& device, const ProjectionSet&
 Refinement refinement_in_sigma(const BrickSigma& sigma, double multiple) {
   Refinement out;
   for (const float s : sigma.of_brick) {
-    out.by_brick.push_back(static_cast<float>(multiple * margin * static_cast<double>(s)));
+    out.by_brick.push_back(static_cast<float>(asked_of_brick(multiple, static_cast<double>(s))));
     out.everywhere_abs = std::max(out.everywhere_abs, multiple * static_cast<double>(s));
   }
   out.digest = fmt::format("{} sigma of {}", multiple, sigma_sha256(sigma.of_brick));

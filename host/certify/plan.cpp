@@ -8,7 +8,6 @@
 #include <chrono>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -18,11 +17,11 @@
 #include "host/certify/bounds/paper_bounds.hpp"
 #include "host/certify/choose_coarsening.hpp"
 #include "host/certify/choose_rates.hpp"
-#include "host/certify/foresee.hpp"
+#include "host/certify/forecaster.hpp"
 #include "host/certify/gold/base_of_gold.hpp"
 #include "host/certify/gold/gold_batch.hpp"
 #include "host/certify/gold/prepared_scan.hpp"
-#include "host/certify/plan_units.hpp"
+#include "host/certify/plan_parts.hpp"
 #include "host/field/fbp/reconstruct.hpp"
 #include "host/scan/row_window.hpp"
 #include "host/volume/bricks.hpp"
@@ -93,13 +92,10 @@ void check_tolerance(const Tolerance& tolerance) {
 }
 
 void set_epsilon(Plan& plan, const Tolerance& tolerance, double largest) {
-  const double given = tolerance.relative ? *tolerance.relative : *tolerance.absolute;
-  plan.epsilon = given;
-  plan.epsilon_abs = given * plan.reference_range;
-  if (tolerance.absolute || plan.settings.comparison.epsilon_of_max) {
-    plan.epsilon_abs = tolerance.absolute ? given : given * largest;
-    plan.epsilon = plan.reference_range > 0 ? plan.epsilon_abs / plan.reference_range : 0;
-  }
+  const bool of_max = plan.settings.comparison.epsilon_of_max;
+  plan.epsilon_abs = tolerance.as_density(of_max ? largest : plan.reference_range);
+  if (tolerance.relative && !of_max) plan.epsilon = *tolerance.relative;
+  else plan.epsilon = plan.reference_range > 0 ? plan.epsilon_abs / plan.reference_range : 0;
   if (!(plan.epsilon_abs > 0))
     throw InputError(
         "the field is constant over the covered samples, so a relative tolerance means nothing; give "
@@ -126,7 +122,7 @@ LevelTriple coarsening_of(const Plan& plan, const Coverage& coverage, const Gold
 // pass of gold.
 double largest_of_gold(opencl::State& state, const FilteredScan& filtered, const FieldSups& sups,
                        const Grid& grid, const Rates& r) {
-  GoldSettings settings{grid, fitting_granularity(4, grid), r.gold, r.upsampling, r.interpolation};
+  GoldSettings settings = gold_settings(grid, fitting_granularity(4, grid), r);
   settings.base_only = true;
   GoldStream stream(state, filtered, sups, settings);
   float largest = 0;
@@ -142,12 +138,13 @@ double seconds_of(const std::function<void()>& work) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-// One plan, step by step. All but the scan, and what is thrown, in `units`.
+// One plan, step by step. All but the scan, and what is thrown, in its units.
 class Planner {
  public:
-  Planner(Device& device, const ProjectionSet& scan, const Units& units, const Grid& grid,
-          const FieldOptions& field, const PlanSettings& settings, const Progress& progress)
-      : device_(device), state_(device.state()), units_(units), progress_(progress), host_(state_) {
+  Planner(Device& device, const ScanInUnits& from, const Grid& grid, const FieldOptions& field,
+          const PlanSettings& settings, const Progress& progress)
+      : device_(device), state_(device.state()), units_(from.units), progress_(progress), host_(state_) {
+    const ProjectionSet& scan = from.scan;
     scan_bytes_ = scan.data.resident_bytes();
     host_.count(scan_bytes_, "the projections, as read,");
     host_.count(8 * static_cast<std::uint64_t>(grid.sample_count()), "the base samples");
@@ -162,7 +159,7 @@ class Planner {
     plan_.layout = {fitting_granularity(settings.granularity, grid), {}, settings.levels};
     report(progress_, "plan", 0.0);
     preparation_ = seconds_of([&] {
-      prepared_ = std::make_shared<PreparedScan>(state_, scan, field, units, sups_wanted(scan), Progress{});
+      prepared_ = std::make_shared<PreparedScan>(state_, from, field, sups_wanted(scan), Progress{});
     });
     coverage_.emplace(prepared_->filtered.geometry, prepared_->filtered.views);
   }
@@ -180,13 +177,13 @@ class Planner {
     // They are made of derivatives along the axes of parallel beam.
     if (!is_cone())
       plan_.bounds = global_bounds(state_, prepared_->filtered, prepared_->sups, plan_.base,
-                                   plan_.settings.foresee, estimates_views_);
+                                   plan_.settings.forecast, estimates_views_);
     report(progress_, "plan", 0.6);
     const Chosen chosen = choose(all);
     take(chosen);
     report(progress_, "plan", 0.8);
     lay_out_base(chosen.trial);
-    if (plan_.settings.foresee) foresee(chosen.trial);
+    if (plan_.settings.forecast) forecast(chosen.trial);
     report(progress_, "plan", 1.0);
     plan_.prepared = prepared_;
     if (estimates_views_) {
@@ -208,11 +205,11 @@ class Planner {
     return small_or_paper ? PreparedScan::Sups::of_derivatives : PreparedScan::Sups::of_values;
   }
 
-  // What trials and foresight look at: kept from the first trial on, all at once.
+  // What trials and forecasts look at: kept from the first trial on, all at once.
   const std::vector<std::uint8_t>& look(GoldRates& gold) {
     if (looked_at_.empty()) {
       looked_at_ = gold.fine().bricks_near_coverage();
-      if (plan_.settings.foresee) {
+      if (plan_.settings.forecast) {
         looked_at_ =
             bricks_to_look_at(gold.coarse() ? *gold.coarse() : gold.fine(), prepared_->filtered.geometry);
         gold.fine().prepare(looked_at_, GoldStream::For::samples, {});
@@ -238,7 +235,7 @@ class Planner {
   }
 
   void look_at_reference() {
-    check_densities(to_world(largest_magnitude(plan_.base.samples), units_));
+    check_densities(largest_magnitude(plan_.base.samples), units_);
     const CoveredRange range = covered_range(plan_.base, *coverage_);
     plan_.not_covered_count = range.not_covered;
     plan_.not_covered_fraction =
@@ -251,15 +248,7 @@ class Planner {
 
   [[nodiscard]] bool is_cone() const { return !prepared_->filtered.views.empty(); }
   [[nodiscard]] bool grid_only() const { return plan_.settings.comparison.terms == Terms::grid; }
-  [[nodiscard]] GoldSettings settings_at(const Rates& r) const {
-    GoldSettings s{plan_.grid, plan_.layout.granularity, r.gold, r.upsampling, r.interpolation};
-    s.midrange = plan_.settings.comparison.coefficients == Coefficients::midrange;
-    s.grid_only = grid_only();
-    s.anisotropic = plan_.layout.levels == Levels::anisotropic;
-    s.coarsening = plan_.layout.coarsening;
-    if (is_cone()) s.least_reach = reach_of_all(s);
-    return s;
-  }
+  [[nodiscard]] GoldSettings settings_at(const Rates& r) const { return gold_settings(plan_, r, is_cone()); }
 
   std::shared_ptr<GoldSource> source_at(const Rates& r) { return prepared_->source(settings_at(r)); }
 
@@ -301,13 +290,11 @@ class Planner {
   // What every brick is brought within at first.
   [[nodiscard]] double everywhere() const {
     const auto& wanted = plan_.settings.everywhere;
-    if (!wanted) return plan_.epsilon_abs;
-    return wanted->relative ? *wanted->relative * (plan_.epsilon_abs / plan_.epsilon)
-                            : from_world(*wanted->absolute, units_);
+    return wanted ? from_world(*wanted, units_).as_density(plan_.whole()) : plan_.epsilon_abs;
   }
 
   // Storage, memory and time.
-  void foresee(const Trial& t) {
+  void forecast(const Trial& t) {
     GoldRates gold(state_, prepared_->filtered, prepared_->sups, settings_at(plan_.rates),
                    source_at(plan_.rates));
     const std::vector<std::uint8_t>& looked_at = look(gold);
@@ -321,27 +308,26 @@ class Planner {
                          stored, {}, source_at(plan_.rates));
     });
     const double all = size(gold.fine().bricks_near_coverage());
-    plan_.foresight = std::make_shared<Foresight>(prepared_, units_, settings_at(plan_.rates), plan_.base,
-                                                  std::move(stored), looked_at);
-    const Foreseen foreseen = plan_.foresight->foresee(everywhere() - t.arithmetic);
-    plan_.samples_ratio = foreseen.samples_ratio;
+    plan_.forecaster = std::make_shared<Forecaster>(prepared_, settings_at(plan_.rates), plan_.base,
+                                                    std::move(stored), looked_at);
+    const BuildForecast build = plan_.forecaster->forecast(to_world(everywhere() - t.arithmetic, units_));
+    plan_.samples_ratio = build.samples_ratio;
     const double probing = seconds_of([&] { probe_filters(device_); });  // as build will
-    plan_.seconds_of_rows = preparation_ + foreseen.kept_seconds;
-    plan_.seconds =
-        preparation_ + fitting * all / std::max(1.0, size(looked_at)) + foreseen.seconds + probing;
-    foresee_memory(foreseen, gold.fine().source()->kept);
+    plan_.seconds_of_rows = preparation_ + build.kept_seconds;
+    plan_.seconds = preparation_ + fitting * all / std::max(1.0, size(looked_at)) + build.seconds + probing;
+    forecast_memory(build, gold.fine().source()->kept);
   }
 
   // Gold that is kept; the base samples, fitted, rounded and on the device; tiles before and after closing
   // and on the device; the scan as read and filtered; and what the trial took beside these, batches of
   // blocks.
-  void foresee_memory(const Foreseen& foreseen, const KeptGold& kept) {
+  void forecast_memory(const BuildForecast& build, const KeptGold& kept) {
     const std::uint64_t base = 4 * plan_.base.samples.size(),
                         scan = scan_bytes_ + prepared_->filtered.samples.resident_bytes(),
                         held = scan + 2 * base + kept.bytes(), peak = state_.memory.peak();
-    plan_.memory_of_rows = kept.bytes() + foreseen.kept_bytes;
+    plan_.memory_of_rows = kept.bytes() + build.kept_bytes;
     plan_.memory_of_cells = 3 * base;
-    plan_.tile_bytes = foreseen.tile_bytes;
+    plan_.tile_bytes = build.tile_bytes;
     plan_.memory_bytes = scan + plan_.memory_of_rows + plan_.memory_of_cells +
                          memory_of_tiles(plan_.tile_bytes, state_.memory.limit(), state_.info.is_gpu) +
                          (peak > held ? peak - held : 0);
@@ -370,7 +356,7 @@ Plan of_all_rows(Plan plan, const RowWindow& window, const ProjectionSet& scan, 
   const ParallelGeometry& g = scan.geometry;
   plan.estimated = true;
   plan.prepared = nullptr;
-  plan.foresight = nullptr;
+  plan.forecaster = nullptr;
   plan.notes.push_back(
       fmt::format("estimated from the rows {} to {} of {}: the range, the bounds and what is foreseen may "
                   "differ in other rows",
@@ -414,17 +400,15 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Grid& grid, cons
   check_rates(rates);
   check_granularity(settings.granularity);
   check_tolerance(tolerance);
-  check_line_integrals(scan);
-  if (tolerance.relative && largest_magnitude(scan.data) == 0)
+  const ScanInUnits from(scan);
+  if (tolerance.relative && from.largest == 0)
     throw InputError(
         "every line integral is 0 in float32, so a relative tolerance means nothing; scale them, or give "
         "`epsilon_abs`");
-  const Units units = units_of(scan);
-  Tolerance wanted = tolerance;
-  if (wanted.absolute) wanted.absolute = from_world(*wanted.absolute, units);
-  Plan plan = to_world(
-      Planner(device, scan, units, from_world(grid, units), field, settings, progress).make(rates, wanted),
-      units);
+  const Units& units = from.units;
+  Plan plan = to_world(Planner(device, from, from_world(grid, units), field, settings, progress)
+                           .make(rates, from_world(tolerance, units)),
+                       units);
   plan.grid = plan.base.grid = grid;
   return plan;
 }

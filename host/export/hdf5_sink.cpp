@@ -10,7 +10,6 @@
 #include "host/base/system/parallel.hpp"
 #include "host/export/pack.hpp"
 #include "host/files/hdf5/hdf5_writer.hpp"
-#include "vdvr/error.hpp"
 #include "vdvr/expert/output_file.hpp"
 
 namespace vdvr {

@@ -77,6 +77,7 @@ FlatField make_flat_field(const io::Frames& flats, const io::Frames& darks, std:
   const auto size = static_cast<std::size_t>(rows * columns);
   FlatField field;
   field.dark = mean_of(darks, size);
+  field.gain.assign(size, 0.0);
   std::vector<double> frame(size);
   // A blank flat among good ones would only scale the mean, so each is looked at alone.
   for (std::int64_t k = 0; k < flats.count; ++k) {
@@ -86,16 +87,16 @@ FlatField make_flat_field(const io::Frames& flats, const io::Frames& darks, std:
       any = any || (frame[i] - field.dark[i] > 0 && std::isfinite(frame[i]));
       if (frame[i] > field.largest_flat) field.largest_flat = frame[i], field.at_largest = 0;
       field.at_largest += frame[i] == field.largest_flat ? 1 : 0;
+      field.gain[i] += frame[i];
     }
     if (!any)
       throw FileError(fmt::format(
           "{}: no pixel of this flat is above the dark; leave it out or measure it again", flats.name(k)));
   }
-  field.gain = mean_of(flats, size);
   std::vector<double> positive;
   for (std::size_t i = 0; i < size; ++i) {
     double& gain = field.gain[i];
-    gain -= field.dark[i];
+    gain = gain / static_cast<double>(flats.count) - field.dark[i];
     if (!(gain > 0) || !std::isfinite(gain)) gain = nan;
     else positive.push_back(gain);
   }

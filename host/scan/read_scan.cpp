@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <fstream>
 #include <future>
 #include <numbers>
 #include <thread>
@@ -16,10 +15,10 @@
 #include "host/base/system/read_in_child.hpp"
 #include "host/scan/cone_scan.hpp"
 #include "host/scan/motion.hpp"
+#include "host/scan/open/open_scan.hpp"
 #include "host/scan/photon_transfer.hpp"
 #include "host/scan/prepare/prepare.hpp"
 #include "host/scan/preprocess.hpp"
-#include "host/scan/raw/open_scan.hpp"
 #include "host/scan/scan_report.hpp"
 #include "host/scan/values.hpp"
 #include "vdvr/error.hpp"
@@ -253,8 +252,10 @@ void choose_center(const fs::path& path, const io::RawScan& raw, const ScanOptio
   require_on_detector(path, g.center, g.columns, options);
 }
 
-// Everything that comes from the files, and nothing kept.
-void read_frames(const fs::path& path, const ScanOptions& options) {
+enum class Wanted { all, flats_and_darks };
+
+// What comes from the files, and nothing kept.
+void read_frames(const fs::path& path, const ScanOptions& options, Wanted wanted) {
   bool folder = false;
   const io::RawScan raw = open_described(path, options, folder);
   std::uint64_t bytes = 0;
@@ -264,15 +265,22 @@ void read_frames(const fs::path& path, const ScanOptions& options) {
   require_room(raw, options, path.string());
   const std::int64_t step = block_views(raw, options.max_memory_bytes);
   std::vector<double> block(static_cast<std::size_t>(step * raw.rows * raw.columns));
-  for (const io::Frames* frames : {&raw.projections, &raw.flats, &raw.darks})
+  std::vector<const io::Frames*> stacks{&raw.flats, &raw.darks};
+  if (wanted == Wanted::all) stacks.insert(stacks.begin(), &raw.projections);
+  for (const io::Frames* frames : stacks)
     for (std::int64_t first = 0; first < frames->count; first += step)
       frames->read(first, std::min(step, frames->count - first), block.data());
 }
 
+// Throws what reading a damaged file would crash of.
+void try_to_read(const fs::path& path, const ScanOptions& options, Wanted wanted) {
+  if (io::holds_hdf5(path))
+    io::read_in_child(path, options.max_memory_bytes, [&] { read_frames(path, options, wanted); });
+}
+
 ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const Progress& progress,
                          Understood& understood) {
-  if (io::holds_hdf5(path))
-    io::read_in_child(path, options.max_memory_bytes, [&] { read_frames(path, options); });
+  try_to_read(path, options, Wanted::all);
   bool folder = false;
   io::RawScan raw = open_described(path, options, folder);
   ProjectionSet scan;
@@ -328,8 +336,7 @@ ProjectionSet read_scan(const fs::path& path, const ScanOptions& options, const 
 }
 
 std::optional<LineIntegralNoise> read_line_noise(const fs::path& path, const ScanOptions& options) {
-  if (io::holds_hdf5(path))
-    io::read_in_child(path, options.max_memory_bytes, [&] { read_frames(path, options); });
+  try_to_read(path, options, Wanted::flats_and_darks);
   bool folder = false;
   const io::RawScan raw = open_described(path, options, folder);
   if (!raw.counts) return std::nullopt;

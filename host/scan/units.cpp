@@ -48,14 +48,40 @@ double largest_magnitude(std::span<const float> samples) {
   return static_cast<double>(largest);
 }
 
-Units units_of(const ProjectionSet& scan) {
+namespace {
+
+Units units_of(const ProjectionSet& scan, double largest) {
   Units units;
   units.across = exponent_of(scan.geometry.pitch_u, usual_pitch);
   // Slanted rays have one unit of length.
   units.along = scan.cone ? units.across : exponent_of(scan.geometry.pitch_v, usual_pitch);
-  units.line = exponent_of(largest_magnitude(scan.data), usual_line);
+  units.line = exponent_of(largest, usual_line);
   return units;
 }
+
+void check(double magnitude, double largest, const char* what, const char* remedy) {
+  constexpr double smallest = 0x1p-126;
+  if (magnitude == 0 || (magnitude >= smallest && magnitude <= largest)) return;
+  throw InputError(fmt::format(
+      "{} reach {:.3g}; float32, in which scans are read and volumes stored, holds {:.3g} to {:.3g}: {}",
+      what, magnitude, smallest, largest, remedy));
+}
+
+double checked_largest(const ProjectionSet& scan) {
+  const double magnitude = largest_magnitude(scan.data);
+  // What is not finite is refused by view, after filtering.
+  if (std::isfinite(magnitude))
+    check(magnitude, static_cast<double>(std::numeric_limits<float>::max()), "the line integrals",
+          "scale them, or state lengths in another unit");
+  return magnitude;
+}
+
+}  // namespace
+
+Units units_of(const ProjectionSet& scan) { return units_of(scan, largest_magnitude(scan.data)); }
+
+ScanInUnits::ScanInUnits(const ProjectionSet& of)
+    : scan(of), largest(checked_largest(of)), units(units_of(of, largest)) {}
 
 void scale(std::span<float> samples, int exponent) {
   if (exponent == 0) return;
@@ -89,29 +115,16 @@ std::array<double, 6> to_world(const std::array<double, 6>& box, const Units& un
   return {low[0], low[1], low[2], high[0], high[1], high[2]};
 }
 
-namespace {
-
-void check(double magnitude, double largest, const char* what, const char* remedy) {
-  constexpr double smallest = 0x1p-126;
-  if (magnitude == 0 || (magnitude >= smallest && magnitude <= largest)) return;
-  throw InputError(fmt::format(
-      "{} reach {:.3g}; float32, in which scans are read and volumes stored, holds {:.3g} to {:.3g}: {}",
-      what, magnitude, smallest, largest, remedy));
-}
-
-}  // namespace
-
-void check_line_integrals(const ProjectionSet& scan) {
-  const double magnitude = largest_magnitude(scan.data);
-  if (!std::isfinite(magnitude)) return;  // refused by view, after filtering
-  check(magnitude, static_cast<double>(std::numeric_limits<float>::max()), "the line integrals",
-        "scale them, or state lengths in another unit");
-}
-
-void check_densities(double magnitude) {
+void check_densities(double largest, const Units& units) {
   // Fitted samples and tiles may rise above the base's.
-  check(magnitude, 0x1p126, "the densities",
+  check(to_world(largest, units), 0x1p126, "the densities",
         "state lengths (the pitch) in another unit, or scale the line integrals");
+}
+
+void densities_to_world(std::span<float> samples, const Units& units) {
+  if (units.are_world()) return;
+  check_densities(largest_magnitude(samples), units);
+  scale(samples, units.density());
 }
 
 }  // namespace vdvr

@@ -24,13 +24,25 @@ struct Units {
 
   /// Of densities, which are line integrals per length across.
   [[nodiscard]] int density() const { return line - across; }
-  [[nodiscard]] bool are_world() const { return across == 0 && along == 0 && line == 0; }
+  [[nodiscard]] bool are_world() const { return *this == Units{}; }
   [[nodiscard]] Units inverse() const { return {-across, -along, -line}; }
+  bool operator==(const Units&) const = default;
 };
 
 /// Those of a scan; all 0 where pitches and the largest line integral are within a few binary orders of 1.
 /// Cost: a pass over the data.
 Units units_of(const ProjectionSet& scan);
+
+/// A scan and the units of what is computed from it, made once where the scan enters a stage. The scan itself
+/// stays in world units, and is referred to.
+struct ScanInUnits {
+  /// Throws InputError unless line integrals are normal numbers of fp32. Cost: a pass over the data.
+  explicit ScanInUnits(const ProjectionSet& scan);
+
+  const ProjectionSet& scan;
+  const double largest;  ///< |line integral|, in world units
+  const Units units;
+};
 
 /// The largest |sample|, 0 of none; a sample that is NaN does not count.
 double largest_magnitude(std::span<const float> samples);
@@ -50,9 +62,10 @@ T from_world(T world, const Units& units) {
   return to_world(std::move(world), units.inverse());
 }
 
-/// Throws InputError unless line integrals, and densities up to `largest`, are normal numbers of fp32 with
-/// room for what rises above them. `largest`: of |F|, in world units; 0 is a number like others.
-void check_line_integrals(const ProjectionSet& scan);
-void check_densities(double largest);
+/// Throws InputError unless densities up to `largest` |F|, which is in `units`, are normal numbers of fp32 in
+/// world units, with room for what rises above them; 0 is a number like others.
+void check_densities(double largest, const Units& units);
+/// Densities in `units` into world units, which are checked so.
+void densities_to_world(std::span<float> samples, const Units& units);
 
 }  // namespace vdvr

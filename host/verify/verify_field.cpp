@@ -1,5 +1,5 @@
-// Bounds cell by cell on gold that verify_nodes makes: part by part, slab by slab. Calls verify_parts.cpp and
-// verify_pieces.cpp.
+// Bounds cell by cell on gold that witness/nodes.cpp makes: part by part, slab by slab. Calls
+// verify_parts.cpp and verify_pieces.cpp.
 #include "host/verify/verify_field.hpp"
 
 #include <fmt/format.h>

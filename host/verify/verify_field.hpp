@@ -1,6 +1,6 @@
 // The bound on |V - F| as `verify` computes it, gold cell by gold cell, at every rate that is asked for
 // (docs/error-bounds.md, "What verify does"). Shares with build only the sampler header. Calls
-// verify_parts.cpp and verify_pieces.cpp; F is verify_nodes', of either beam.
+// verify_parts.cpp and verify_pieces.cpp; F is that of witness/nodes.hpp, of either beam.
 #pragma once
 
 #include <array>
@@ -15,8 +15,8 @@
 
 #include "host/base/opencl/array.hpp"
 #include "host/field/fbp/coverage.hpp"
-#include "host/verify/witness/verify_cone_bounds.hpp"
-#include "host/verify/witness/verify_nodes.hpp"
+#include "host/verify/witness/cone_bounds.hpp"
+#include "host/verify/witness/nodes.hpp"
 #include "host/volume/sampler/device_field.hpp"
 #include "vdvr/expert/exact_field.hpp"
 #include "vdvr/expert/mixed_volume.hpp"

@@ -1,7 +1,6 @@
 // Covered samples of a grid.
 #include "host/volume/covered_range.hpp"
 
-#include <cmath>
 #include <vector>
 
 #include "host/base/system/casts.hpp"

@@ -9,7 +9,6 @@
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
 #include "host/volume/brick_layout.hpp"
-#include "vdvr/error.hpp"
 
 namespace vdvr {
 

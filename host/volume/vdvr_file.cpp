@@ -5,13 +5,11 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <new>
 #include <optional>
-#include <span>
 
 #include "host/base/system/limits.hpp"
 #include "host/base/system/read_in_child.hpp"
@@ -20,7 +18,6 @@
 #include "host/volume/validate_volume.hpp"
 #include "host/volume/vdvr_layout.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/expert/hash.hpp"
 
 namespace vdvr {
 namespace {

@@ -25,8 +25,8 @@ VDVR_API ProjectionSet read_scan(const std::filesystem::path& path, const ScanOp
 
 /// What repeated flats and darks of the same scan say of its line integrals, pixel by pixel (photon transfer:
 /// Janesick, SPIE Press 2007), of binned ones where `preparation` bins. Nothing of line integrals, of fewer
-/// than five flats, or where flats do not vary. Throws what read_scan() throws. Cost: flats and darks are
-/// read twice.
+/// than five flats, or where flats do not vary. Throws what read_scan() throws of these.
+/// Cost: flats are read three times, darks twice, projections not at all.
 VDVR_API std::optional<LineIntegralNoise> read_line_noise(const std::filesystem::path& path,
                                                           const ScanOptions& options = {});
 

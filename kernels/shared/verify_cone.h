@@ -1,5 +1,5 @@
 // Layouts of the nodes that `verify` back-projects of cone-beam views (verify_cone.cl). Passed by value from
-// host/verify/witness/verify_cone_nodes.cpp.
+// host/verify/witness/cone_nodes.cpp.
 #ifndef VDVR_VERIFY_CONE_H
 #define VDVR_VERIFY_CONE_H
 

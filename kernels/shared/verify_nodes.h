@@ -1,5 +1,5 @@
 // Layouts of what `verify` makes F of: the table of fine columns, the nodes that are back-projected, blocks
-// of gold made of these (verify_nodes.cl). Passed by value from host/verify/witness/verify_nodes.cpp.
+// of gold made of these (verify_nodes.cl). Passed by value from host/verify/witness/nodes.cpp.
 #ifndef VDVR_VERIFY_NODES_H
 #define VDVR_VERIFY_NODES_H
 

@@ -383,8 +383,8 @@ void add_plans(nb::module_& m) {
           "gold", [](const CertifyOptions& o) { return o.rates.gold; },
           [](CertifyOptions& o, std::optional<int> n) { o.rates.gold = n; }, nb::arg().none())
       .def_prop_rw(
-          "foresee", [](const CertifyOptions& o) { return o.plan.foresee; },
-          [](CertifyOptions& o, bool foresee) { o.plan.foresee = foresee; })
+          "forecast", [](const CertifyOptions& o) { return o.plan.forecast; },
+          [](CertifyOptions& o, bool forecast) { o.plan.forecast = forecast; })
       .def_prop_rw(
           "levels", [](const CertifyOptions& o) { return o.plan.levels; },
           [](CertifyOptions& o, Levels levels) { o.plan.levels = levels; })

@@ -168,7 +168,7 @@ def build(
     """
     wanted = _options(**options)
     wanted.input = _stated(scan)
-    wanted.foresee = False
+    wanted.forecast = False
     projections, asked = _checked(scan), tolerance(epsilon, epsilon_abs, photons, sigma_p)
     asked.source = scan._source
     if save is None:

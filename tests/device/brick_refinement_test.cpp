@@ -31,7 +31,7 @@ struct Case {
     scan = support::simulated(shepp_logan(12), 33, 17, 40);
     scan.geometry.pitch_u = scan.geometry.pitch_v = pitch;
     PlanSettings settings;
-    settings.foresee = false;
+    settings.forecast = false;
     plan = make_plan(device, scan, make_grid(scan.geometry, {}), {}, {}, {finest, {}}, settings);
   }
   [[nodiscard]] double range() const { return plan.reference_range; }

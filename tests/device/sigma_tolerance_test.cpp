@@ -130,8 +130,8 @@ BOOST_AUTO_TEST_CASE(the_mean_error_is_that_of_points_drawn_by_chance) {
 }
 
 BOOST_AUTO_TEST_CASE(other_filters_leave_less_noise_and_store_less) {
-  const auto rows = foresee_filters(vdvr::support::device(), noisy_scan(),
-                                    Tolerance{{}, built(1).certificate.noise->median}, {}, stated_noise());
+  const auto rows = forecast_filters(vdvr::support::device(), noisy_scan(),
+                                     Tolerance{{}, built(1).certificate.noise->median}, {}, stated_noise());
   BOOST_TEST_REQUIRE(rows.size() == ramp_windows.size());
   const auto row = [&](RampWindow filter) {
     return *std::find_if(rows.begin(), rows.end(),

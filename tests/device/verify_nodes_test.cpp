@@ -1,6 +1,6 @@
 // F as verify makes it, held to F in double precision at every node, within what it charges.
 #define BOOST_TEST_MODULE verify_nodes
-#include "host/verify/witness/verify_nodes.hpp"
+#include "host/verify/witness/nodes.hpp"
 
 #include <boost/test/unit_test.hpp>
 #include <cmath>

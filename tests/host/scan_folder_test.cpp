@@ -3,7 +3,7 @@
 #include <boost/test/data/test_case.hpp>
 
 #include "host/files/io/natural_order.hpp"
-#include "host/scan/raw/scan_folder.hpp"
+#include "host/scan/open/scan_folder.hpp"
 #include "tests/support/scan_files.hpp"
 #include "vdvr/expert/hash.hpp"
 

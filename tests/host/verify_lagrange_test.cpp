@@ -1,6 +1,6 @@
 // Twelve points of Lagrange as verify uses them: weights, what they err on a band, how errors of nodes grow.
 #define BOOST_TEST_MODULE verify_lagrange
-#include "host/verify/witness/verify_lagrange.hpp"
+#include "host/verify/witness/lagrange.hpp"
 
 #include <array>
 #include <boost/test/unit_test.hpp>
@@ -9,7 +9,7 @@
 #include <numbers>
 #include <random>
 
-#include "host/verify/witness/verify_bounds.hpp"
+#include "host/verify/witness/field_bounds.hpp"
 #include "tests/support/tolerance.hpp"
 
 using namespace vdvr;

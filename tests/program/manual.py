@@ -65,8 +65,10 @@ for page, texts in helps.items():
 expect(set(options_of(helps["vdvr-paper"][0])) == set(completed(paper, "-")), "options of vdvr-paper")
 
 # Choices, files, folders; an option's value after '=', which bash makes a word of.
-expect(completed(vdvr, "build", "a.h5", "--closing", "") == ["coarse", "paper", "none"], "choices of --closing")
-expect(completed(vdvr, "build", "--closing", "=", "co") == ["coarse"], "--closing=co")
+expect(completed(vdvr, "build", "a.h5", "--storage", "") == ["auto", "f32", "u16", "u8"], "choices of --storage")
+expect(completed(vdvr, "build", "--storage", "=", "f") == ["f32"], "--storage=f")
+for hidden in ("--closing", "--coefficients", "--levels", "--terms", "--epsilon-of"):
+    expect(hidden not in options_of(helps["vdvr-build"][0]), f"--help of build tells of {hidden}")
 expect(completed(vdvr, "export", "--oversampling", "") == ["1", "2", "4", "8"], "numbers to choose from")
 expect(completed(vdvr, "build", "--epsilon", "") == [], "a number has no completion")
 expect(str(manuals) in completed(vdvr, "info", str(manuals)[:-1]), "a file is completed")

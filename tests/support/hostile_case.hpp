@@ -320,7 +320,7 @@ inline void draw_options(Random& random, Case& c) {
     c.settings.comparison.coefficients = Coefficients::sampled;
     c.settings.levels = Levels::isotropic;
   }
-  c.settings.foresee = chance(random, 0.3);
+  c.settings.forecast = chance(random, 0.3);
   c.settings.granularity = one_of(random, {1, 2, 2, 4, 4, 4, 8});
   c.options.storage = one_of(random, {StorageChoice::automatic, StorageChoice::automatic, StorageChoice::f32,
                                       StorageChoice::u16, StorageChoice::u8});

@@ -168,7 +168,7 @@ int bench_build(Arguments& args) {
   const CommonOptions common = common_options(args);
   Wanted wanted = wanted_of(args);
   wanted.noted_noise = false;
-  wanted.options.plan.foresee = false;
+  wanted.options.plan.forecast = false;
   const auto repetitions = static_cast<std::size_t>(args.integer_or("repetitions", 1, 1, 1000));
   ProgressLine progress(args.who(), common.quiet);
   Device device = open_device(common);

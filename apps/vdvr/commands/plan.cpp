@@ -80,7 +80,7 @@ void print_spread(const Spread& s) {
 }
 
 // Of pictures, their own foreseen in place of what one tolerance for all bricks takes.
-Json foreseen_json(const Planned& p, const std::optional<PictureForecast>& forecast) {
+Json plan_forecast_json(const Planned& p, const std::optional<PictureForecast>& forecast) {
   const Plan& plan = p.made.plan;
   Json json = {{"gold_samples", plan.gold_samples},
                {"memory_bytes", forecast ? forecast->memory_bytes : plan.memory_bytes},
@@ -103,7 +103,7 @@ Json plan_json(const Planned& p, const std::optional<PictureForecast>& forecast)
           {"base", cells_per_base_sample(plan.layout.coarsening)},
           {"bounds", bounds_json(plan.bounds)},
           {"budget", budget_json(plan.budget)},
-          {"foreseen", foreseen_json(p, forecast)},
+          {"foreseen", plan_forecast_json(p, forecast)},
           {"not_covered", {{"count", plan.not_covered_count}, {"fraction", plan.not_covered_fraction}}},
           {"grid", grid_json(plan.grid)},
           {"geometry", geometry_json(p.scan.geometry)},

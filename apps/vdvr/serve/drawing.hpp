@@ -5,7 +5,6 @@
 #include <deque>
 #include <future>
 #include <mutex>
-#include <optional>
 #include <string>
 #include <thread>
 

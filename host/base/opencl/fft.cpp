@@ -7,7 +7,6 @@
 #pragma GCC diagnostic pop
 #include <fmt/format.h>
 
-#include <array>
 #include <cmath>
 #include <complex>
 #include <map>

@@ -1,6 +1,5 @@
 #include "host/base/system/length_unit.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <utility>

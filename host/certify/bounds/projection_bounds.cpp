@@ -12,7 +12,6 @@
 #include <mutex>
 #include <numbers>
 #include <optional>
-#include <utility>
 
 #include "host/base/opencl/column_tuning.hpp"
 #include "host/base/opencl/kernel.hpp"

@@ -5,7 +5,6 @@
 #include <complex>
 #include <cstddef>
 #include <numbers>
-#include <span>
 
 namespace vdvr {
 namespace {

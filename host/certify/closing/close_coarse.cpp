@@ -1,7 +1,6 @@
 // Closing `coarse`: the fine side follows the coarse one. Interpolates with the sampler's own lerp, so that
 // the stored samples of a fine brick lie on what its coarse neighbour interpolates.
 #include <algorithm>
-#include <utility>
 
 #include "host/base/system/casts.hpp"
 #include "host/certify/closing/close_boundaries.hpp"

@@ -188,16 +188,16 @@ Crew::Crew(Device& leader, PreparedScan& from, const GoldSettings& settings, con
       s.remote(m).send(message_to_open(CrewWord::open, options));
     }
     const std::span<const float> samples(from.filtered.samples.data(), from.filtered.samples.size());
-    const std::uint64_t shared = messenger.others() > 0 ? messenger.share(std::as_bytes(samples)) : 0;
-    const std::uint64_t common = all && messenger.others() > 0 ? share_gold(from, settings, shared) : 0;
+    const std::uint64_t lent = messenger.others() > 0 ? messenger.lend(std::as_bytes(samples)) : 0;
+    const std::uint64_t common = all && messenger.others() > 0 ? pool_gold(from, settings, lent) : 0;
     for (State::Member& m : s.members) {
       if (!m.worker->is_remote()) continue;
-      s.remote(m).send(message_of(CrewWord::scan, shared, std::uint64_t{samples.size()},
-                                  options.mixed_devices, common, from.filtered, from.sups, settings));
+      s.remote(m).send(message_of(CrewWord::scan, lent, std::uint64_t{samples.size()}, options.mixed_devices,
+                                  common, from.filtered, from.sups, settings));
     }
     wait_for_kinds();
   } else if (all) {
-    share_gold(from, settings, 0);
+    pool_gold(from, settings, 0);
   }
   if (options.mixed_devices || kinds_.size() == 1) return;
   throw InputError(fmt::format(
@@ -222,7 +222,7 @@ CommonMemory memory_of_threads(std::uint64_t bytes, int sharers) {
 // Where devices compute in the host's memory, gold is kept once for those of a machine, and made by all of
 // them; processes of other machines do so among themselves. Returns the number by which processes ask for
 // such memory, 0 where they must not.
-std::uint64_t Crew::share_gold(PreparedScan& from, const GoldSettings& settings, std::uint64_t number) {
+std::uint64_t Crew::pool_gold(PreparedScan& from, const GoldSettings& settings, std::uint64_t number) {
   State& s = *state_;
   // What a device made, others of another kind would read.
   if (s.options.mixed_devices) return 0;
@@ -237,7 +237,7 @@ std::uint64_t Crew::share_gold(PreparedScan& from, const GoldSettings& settings,
       s.options.messenger ? s.options.messenger->common(number, bytes) : memory_of_threads(bytes, sharers);
   if (memory.bytes.empty()) return 0;
   kept.share(memory, true);
-  for (const auto& other : s.others) other->share_gold([memory](std::uint64_t) { return memory; });
+  for (const auto& other : s.others) other->pool_gold([memory](std::uint64_t) { return memory; });
   return number;
 }
 

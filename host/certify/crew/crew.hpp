@@ -101,7 +101,7 @@ class Crew {
   class Leader;
   struct State;
   void wait_for_kinds();
-  std::uint64_t share_gold(PreparedScan& from, const GoldSettings& settings, std::uint64_t number);
+  std::uint64_t pool_gold(PreparedScan& from, const GoldSettings& settings, std::uint64_t number);
   std::unique_ptr<State> state_;
   std::vector<Kind> kinds_;
 };

@@ -26,7 +26,7 @@ class CrewMember {
                const Progress& progress);
   /// Gold is kept in memory that others have too, where `room` has some: asked once, for so many bytes.
   using RoomForGold = std::function<CommonMemory(std::uint64_t)>;
-  void share_gold(RoomForGold room) { room_for_gold_ = std::move(room); }
+  void pool_gold(RoomForGold room) { room_for_gold_ = std::move(room); }
   /// Records of `remainder` that others computed.
   void learn(const std::vector<Bytes>& records);
   /// GoldRates::arithmetic of this device.

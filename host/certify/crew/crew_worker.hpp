@@ -46,7 +46,7 @@ class OtherDevice final : public CrewDevice {
     member_.compute(works, on_record, progress);
   }
   void learn(const std::vector<Bytes>& records) override { member_.learn(records); }
-  void share_gold(CrewMember::RoomForGold room) { member_.share_gold(std::move(room)); }
+  void pool_gold(CrewMember::RoomForGold room) { member_.pool_gold(std::move(room)); }
   [[nodiscard]] double arithmetic() { return member_.arithmetic(); }
 
  private:

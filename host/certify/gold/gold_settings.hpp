@@ -51,6 +51,11 @@ struct GoldSettings {
   [[nodiscard]] LevelTriple finest() const { return finest_level(rate, coarsening); }
 };
 
+/// Gold at these rates; nothing else is asked of it.
+inline GoldSettings gold_settings(const Grid& grid, int granularity, const Rates& rates) {
+  return {grid, granularity, rates.gold, rates.upsampling, rates.interpolation};
+}
+
 /// The base alone as a volume, every brick at level 0.
 inline MixedVolume as_mixed(std::vector<float> base, const GoldSettings& settings) {
   MixedVolume m;

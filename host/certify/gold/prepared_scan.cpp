@@ -8,23 +8,10 @@
 namespace vdvr {
 namespace {
 
-// Of the line integrals and the geometry: one scan read again has the same, another's differs but by an
-// accident of 2^-64.
-std::uint64_t checksum(const ProjectionSet& scan) {
+std::uint64_t checksum(const SampleArray& samples) {
   std::uint64_t sum = 0xcbf29ce484222325u;
-  const auto add = [&](std::uint64_t word) { sum = std::rotl((sum ^ word) * 0x9e3779b97f4a7c15u, 29); };
-  for (const float v : scan.data) add(std::bit_cast<std::uint32_t>(v));
-  const ParallelGeometry& g = scan.geometry;
-  for (const double v : g.theta_rad) add(std::bit_cast<std::uint64_t>(v));
-  for (const double v : {g.pitch_u, g.pitch_v, g.center}) add(std::bit_cast<std::uint64_t>(v));
-  add(static_cast<std::uint64_t>(g.rows));
-  add(static_cast<std::uint64_t>(g.columns));
-  if (scan.cone) {
-    for (const ViewMatrix& matrix : scan.cone->views)
-      for (const auto& row : matrix)
-        for (const double m : row) add(std::bit_cast<std::uint64_t>(m));
-    add(static_cast<std::uint64_t>(scan.cone->redundancy));
-  }
+  for (const float v : samples)
+    sum = std::rotl((sum ^ std::bit_cast<std::uint32_t>(v)) * 0x9e3779b97f4a7c15u, 29);
   return sum;
 }
 
@@ -48,25 +35,24 @@ FieldSups sups_of(opencl::State& state, Upsampler& upsampler, const FilteredScan
 
 }  // namespace
 
-PreparedScan::PreparedScan(opencl::State& device, const ProjectionSet& scan, const FieldOptions& field,
-                           const Units& units, Sups wanted, const Progress& progress)
+PreparedOf::PreparedOf(const opencl::State& on, const ScanInUnits& from, const FieldOptions& wanted)
+    : state(&on),
+      field(wanted),
+      units(from.units),
+      geometry(from.scan.geometry),
+      cone(from.scan.cone),
+      samples(checksum(from.scan.data)) {}
+
+PreparedScan::PreparedScan(opencl::State& device, const ScanInUnits& from, const FieldOptions& field,
+                           Sups wanted, const Progress& progress)
     : shared(device.shared_from_this()),
       state(device),
-      filtered(filter_scan(device, scan, field, progress, Precision::fp64, units)),
+      of(device, from, field),
+      filtered(filter_scan(device, from.scan, field, progress, Precision::fp64, of.units)),
       upsampler(device, filtered, ColumnMethod::accurate),
       sups(sups_of(device, upsampler, filtered, wanted)),
-      host_(device),
-      field_(field),
-      units_(units),
-      checksum_(checksum(scan)) {
+      host_(device) {
   host_.count(filtered.samples.resident_bytes(), "the projections, filtered,");
-}
-
-bool PreparedScan::is_of(const opencl::State& device, const ProjectionSet& scan, const FieldOptions& field,
-                         const Units& units) const {
-  return &device == &state && field.filter == field_.filter && field.cutoff == field_.cutoff &&
-         field.center == field_.center && units.across == units_.across && units.along == units_.along &&
-         units.line == units_.line && checksum(scan) == checksum_;
 }
 
 std::shared_ptr<GoldSource> PreparedScan::source(const GoldSettings& s) {

@@ -46,7 +46,7 @@ bool TripleSearch::is_isotropic(const LevelTriple& l) const {
 }
 
 // Interpolation along one axis after the other: errors of either sign add up. Fitted samples halve them.
-float TripleSearch::foreseen(const Brick& brick, const LevelTriple& level) const {
+float TripleSearch::forecast(const Brick& brick, const LevelTriple& level) const {
   float plus = 0, minus = 0;
   for (std::size_t a = 0; a < 3; ++a) {
     const std::size_t l = level[2 - a];
@@ -69,7 +69,7 @@ std::optional<LevelTriple> TripleSearch::next(const Brick& brick, float toleranc
                                       [&](const LevelTriple& f) { return is_coarser(level, f); });
     if (hopeless) continue;
     if (!anisotropic_ || brick.failed.size() >= most_failures ||
-        slack_share * brick.slack + first_scale * brick.scale * foreseen(brick, level) <= tolerance)
+        slack_share * brick.slack + first_scale * brick.scale * forecast(brick, level) <= tolerance)
       return level;
   }
   return std::nullopt;
@@ -77,7 +77,7 @@ std::optional<LevelTriple> TripleSearch::next(const Brick& brick, float toleranc
 
 void TripleSearch::fail(Brick& brick, const LevelTriple& level, float total) const {
   brick.failed.push_back(level);
-  const float expected = first_scale * foreseen(brick, level);
+  const float expected = first_scale * forecast(brick, level);
   if (expected > 0)
     brick.scale = std::max(brick.scale, std::min((total - slack_share * brick.slack) / expected, 2.0f));
 }

@@ -38,7 +38,7 @@ class TripleSearch {
   void fail(Brick& brick, const LevelTriple& level, float total) const;
 
  private:
-  [[nodiscard]] float foreseen(const Brick& brick, const LevelTriple& level) const;
+  [[nodiscard]] float forecast(const Brick& brick, const LevelTriple& level) const;
 
   [[nodiscard]] bool is_isotropic(const LevelTriple& level) const;
 

@@ -8,7 +8,6 @@
 #include <chrono>
 #include <cmath>
 #include <functional>
-#include <future>
 #include <optional>
 
 #include "host/base/opencl/host_memory.hpp"
@@ -166,9 +165,11 @@ Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Ups
   return volume.take();
 }
 
-void reconstruct_parallel(opencl::State& state, const ProjectionSet& scan, const Units& units,
-                          const Grid& grid, const ReconstructOptions& options, const Planes& planes,
-                          const Progress& progress, StageWatch& watch) {
+void reconstruct_parallel(opencl::State& state, const ScanInUnits& from, const Grid& grid,
+                          const ReconstructOptions& options, const Planes& planes, const Progress& progress,
+                          StageWatch& watch) {
+  const ProjectionSet& scan = from.scan;
+  const Units& units = from.units;
   // Without upsampling the filtered scan need not pass through the host. It does as soon as one slab needs
   // it.
   std::optional<DirectFilter> direct;

@@ -32,9 +32,9 @@ Volume reconstruct_field(opencl::State& state, const FilteredScan& filtered, Ups
 void transpose_row(std::span<const float> columns, std::int64_t stride, std::int64_t nz,
                    std::array<std::int32_t, 2> kept, float* target, std::int64_t plane);
 
-/// FBP of a scan; grid in `units`. Cost and memory: as reconstruct_planes().
-void reconstruct_parallel(opencl::State& state, const ProjectionSet& scan, const Units& units,
-                          const Grid& grid, const ReconstructOptions& options, const Planes& planes,
-                          const Progress& progress, StageWatch& watch);
+/// FBP of a scan; the grid is in its units. Cost and memory: as reconstruct_planes().
+void reconstruct_parallel(opencl::State& state, const ScanInUnits& from, const Grid& grid,
+                          const ReconstructOptions& options, const Planes& planes, const Progress& progress,
+                          StageWatch& watch);
 
 }  // namespace vdvr

@@ -104,14 +104,14 @@ Sizes sizes_for(const opencl::State& state, const FilteredScan& scan, int rate, 
 
 }  // namespace
 
-void reconstruct_cone(opencl::State& state, const ProjectionSet& scan, const Units& units, const Grid& grid,
+void reconstruct_cone(opencl::State& state, const ScanInUnits& from, const Grid& grid,
                       const ReconstructOptions& options, const Planes& planes, const Progress& progress,
                       StageWatch& watch) {
   if (options.interpolation != Interpolation::linear)
     throw InputError("cone beam: `u_filter` can only be linear; raise `upsampling` instead");
   const int rate = options.upsampling;
-  const FilteredScan filtered =
-      filter_cone(state, scan, options.field, progress, rate == 1 ? Precision::fp32 : Precision::fp64, units);
+  const FilteredScan filtered = filter_cone(state, from.scan, options.field, progress,
+                                            rate == 1 ? Precision::fp32 : Precision::fp64, from.units);
   watch.lap(state, "filter");
   back_project_views(state, filtered, grid, rate, 2, planes, progress, watch);
 }

@@ -1,9 +1,6 @@
 // Uniform FDK on the device.
 #pragma once
 
-#include <cstdint>
-#include <functional>
-
 #include "host/base/opencl/state.hpp"
 #include "host/field/fbp/filter_projections.hpp"
 #include "host/field/fbp/whole_volume.hpp"
@@ -12,9 +9,9 @@
 
 namespace vdvr {
 
-/// The grid is in `units`. Cost: views * samples updates. Memory: a band of the volume and as many views as
-/// the rest of --max-memory holds.
-void reconstruct_cone(opencl::State& state, const ProjectionSet& scan, const Units& units, const Grid& grid,
+/// The grid is in the scan's units. Cost: views * samples updates. Memory: a band of the volume and as many
+/// views as the rest of --max-memory holds.
+void reconstruct_cone(opencl::State& state, const ScanInUnits& from, const Grid& grid,
                       const ReconstructOptions& options, const Planes& planes, const Progress& progress,
                       StageWatch& watch);
 

@@ -1,8 +1,6 @@
 // Reconstruction of scans of either beam, in their users' units.
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "host/base/opencl/host_memory.hpp"
 #include "host/field/fbp/coverage.hpp"
 #include "host/field/fbp/reconstruct.hpp"
@@ -15,15 +13,15 @@
 namespace vdvr {
 namespace {
 
-// In `units`, as the grid is.
-void reconstruct_scan(opencl::State& state, const ProjectionSet& scan, const Units& units, const Grid& grid,
+// The grid is in the scan's units.
+void reconstruct_scan(opencl::State& state, const ScanInUnits& from, const Grid& grid,
                       const ReconstructOptions& options, const Planes& planes, const Progress& progress,
                       StageWatch& watch) {
   if (options.upsampling < 1 || options.upsampling > 64 ||
       (options.upsampling & (options.upsampling - 1)) != 0)
     throw InputError(fmt::format("`upsampling` {} must be a power of two, 1 to 64", options.upsampling));
-  if (scan.cone) reconstruct_cone(state, scan, units, grid, options, planes, progress, watch);
-  else reconstruct_parallel(state, scan, units, grid, options, planes, progress, watch);
+  if (from.scan.cone) reconstruct_cone(state, from, grid, options, planes, progress, watch);
+  else reconstruct_parallel(state, from, grid, options, planes, progress, watch);
 }
 
 }  // namespace
@@ -45,24 +43,20 @@ std::vector<std::string> check_scan(const ProjectionSet& scan) {
 Volume reconstruct(Device& device, const ProjectionSet& scan, const Grid& grid,
                    const ReconstructOptions& options, const Progress& progress, StageSeconds* seconds) {
   StageWatch watch(seconds);
-  check_line_integrals(scan);
-  const Units units = units_of(scan);
-  WholeVolume whole(from_world(grid, units));
-  reconstruct_scan(device.state(), scan, units, from_world(grid, units), options, whole.planes(), progress,
-                   watch);
+  const ScanInUnits from(scan);
+  const Grid in_units = from_world(grid, from.units);
+  WholeVolume whole(in_units);
+  reconstruct_scan(device.state(), from, in_units, options, whole.planes(), progress, watch);
   Volume volume = whole.take();
-  if (units.are_world()) return volume;
   volume.grid = grid;
-  check_densities(to_world(largest_magnitude(volume.samples), units));
-  scale(volume.samples, units.density());
+  densities_to_world(volume.samples, from.units);
   return volume;
 }
 
 void reconstruct_planes(Device& device, const ProjectionSet& scan, const Grid& grid,
                         const ReconstructOptions& options, const TakePlanes& take, const Progress& progress) {
   StageWatch watch(nullptr);
-  check_line_integrals(scan);
-  const Units units = units_of(scan);
+  const ScanInUnits from(scan);
   const Index3 n = grid.samples();
   HostMemory host(device.state());
   std::vector<float> slab;
@@ -74,13 +68,10 @@ void reconstruct_planes(Device& device, const ProjectionSet& scan, const Grid& g
     return slab.data();
   };
   planes.done = [&](std::int64_t first, std::int64_t) {
-    if (!units.are_world()) {
-      check_densities(to_world(largest_magnitude(slab), units));
-      scale(slab, units.density());
-    }
+    densities_to_world(slab, from.units);
     take(first, slab);
   };
-  reconstruct_scan(device.state(), scan, units, from_world(grid, units), options, planes, progress, watch);
+  reconstruct_scan(device.state(), from, from_world(grid, from.units), options, planes, progress, watch);
 }
 
 }  // namespace vdvr

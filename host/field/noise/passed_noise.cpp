@@ -7,7 +7,6 @@
 #include <complex>
 #include <numbers>
 #include <random>
-#include <span>
 
 #include "host/base/system/casts.hpp"
 #include "host/base/system/limits.hpp"

@@ -1,6 +1,5 @@
 #include "host/files/io/natural_order.hpp"
 
-#include <algorithm>
 #include <cctype>
 
 namespace vdvr::io {

@@ -1,7 +1,6 @@
 #include "host/files/io/tiff_messages.hpp"
 
 #include <array>
-#include <cstdio>
 #include <string>
 
 namespace vdvr::io {

@@ -1,7 +1,6 @@
 // How far a drawn picture can lie from the ideal one.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "vdvr/error.hpp"
 #include "vdvr/expert/certify_picture.hpp"

@@ -1,7 +1,6 @@
 // Intervals of a slice's pixels: V at their middles and the bounds of bricks.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include "host/base/system/outward.hpp"

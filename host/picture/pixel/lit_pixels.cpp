@@ -3,8 +3,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
-#include <limits>
 
 #include "host/base/system/outward.hpp"
 #include "host/base/system/parallel.hpp"

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
-#include <limits>
 
 #include "host/picture/pixel/range_table.hpp"
 #include "host/picture/render/bake.hpp"

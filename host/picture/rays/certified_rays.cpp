@@ -1,7 +1,6 @@
 #include "vdvr/expert/certified_rays.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "host/base/system/outward.hpp"

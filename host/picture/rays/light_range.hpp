@@ -2,7 +2,6 @@
 // (kernels/device/shade.h) over intervals, in double precision (docs/pixel-bounds.md, section 7).
 #pragma once
 
-#include <array>
 #include <utility>
 #include <vector>
 

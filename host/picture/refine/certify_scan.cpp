@@ -42,8 +42,7 @@ PictureRefinementOptions PlannedScan::refinement_options() const {
 }
 
 double PlannedScan::everywhere_abs() const {
-  const double everywhere = asked.tolerance.absolute.value_or(asked.tolerance.relative.value_or(1) *
-                                                              (plan.epsilon_abs / plan.epsilon));
+  const double everywhere = asked.tolerance.as_density(plan.whole());
   if (!(everywhere >= plan.epsilon_abs))
     throw InputError(
         fmt::format("`epsilon` {:.4g} lies below {:.4g}, the least that `picture_finest` asks of a brick",
@@ -91,7 +90,7 @@ BuildResult certify_planned(Device& device, const ProjectionSet& scan, PlannedSc
 BuildResult certify_scan(Device& device, const ProjectionSet& scan, const AskedTolerance& asked,
                          const std::optional<ScanNoise>& noise, CertifyOptions options,
                          const Progress& progress) {
-  options.plan.foresee = false;
+  options.plan.forecast = false;
   PlannedScan planned = plan_scan(device, scan, asked, noise, options, progress);
   return certify_planned(device, scan, planned, std::move(options), progress);
 }

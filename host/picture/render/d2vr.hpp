@@ -1,7 +1,6 @@
 // Frames of a D2vrScene, and what the classes hold on the device.
 #pragma once
 
-#include <utility>
 #include <vector>
 
 #include "host/base/opencl/array.hpp"

@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 
 #include "host/scan/geometry/description.hpp"
-#include "vdvr/error.hpp"
 
 namespace vdvr::io {
 namespace {

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <string>
-#include <vector>
 
 #include "host/files/hdf5/hdf5_reader.hpp"
 #include "host/scan/raw/raw_scan.hpp"

@@ -2,7 +2,6 @@
 // region is convex.
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
 #include "vdvr/expert/projections.hpp"

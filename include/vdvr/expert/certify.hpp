@@ -20,7 +20,7 @@ struct CertifyOptions {
   GridOptions grid;    ///< the covered region at the detector's pitch, unless given; with `build.roi` and no
                        ///< `size` those of its bricks that the region meets: the range is then theirs
   RateOptions rates;
-  PlanSettings plan;  ///< foresee: of make_plan alone; certify() needs nothing of it
+  PlanSettings plan;  ///< forecast: of make_plan alone; certify() needs nothing of it
   BuildOptions build;
   InputStatement input;  ///< what was stated when the scan was read (Understood::stated), for the certificate
 };

@@ -29,6 +29,7 @@ VDVR_API std::optional<Redundancy> redundancy_of(const std::string& text);
 struct ConeGeometry {
   std::vector<ViewMatrix> views;
   Redundancy redundancy = Redundancy::full_turn;
+  bool operator==(const ConeGeometry&) const = default;
 };
 
 /// What a matrix says of its view, in the matrix' units of length.

@@ -19,8 +19,8 @@
 
 namespace vdvr {
 
-/// Carries messages between the process that leads a build, number 0, and others, which serve(). A program
-/// has one; the library knows no MPI. Called by one thread.
+/// Carries messages between the process that leads a build, number 0, and others, which join_crew(). A
+/// program has one; the library knows no MPI. Called by one thread.
 class VDVR_API Messenger {
  public:
   Messenger() = default;
@@ -40,9 +40,9 @@ class VDVR_API Messenger {
   virtual std::optional<std::pair<int, std::vector<std::byte>>> receive(std::chrono::milliseconds wait) = 0;
   /// Of the leader: all the others will be able to read these bytes, once for each machine, by the number
   /// returned.
-  virtual std::uint64_t share(std::span<const std::byte> bytes) = 0;
+  virtual std::uint64_t lend(std::span<const std::byte> bytes) = 0;
   /// Of the others: those bytes, and what keeps them. Waits for them.
-  virtual std::pair<std::span<const std::byte>, std::shared_ptr<const void>> shared(std::uint64_t number) = 0;
+  virtual std::pair<std::span<const std::byte>, std::shared_ptr<const void>> lent(std::uint64_t number) = 0;
   /// Memory of at least so many bytes, zeros at first, that all of this machine who ask by that number read
   /// and write; empty where there is none to be had, or the first of the machine has not asked for it in
   /// time.
@@ -77,7 +77,7 @@ VDVR_API void wake(Device& leader, const CrewOptions& options);
 
 /// Computes blocks for the leader until it says that it is done. Opens the device that the leader names.
 /// Throws what opening it throws, after the leader was told.
-VDVR_API void serve(Messenger& messenger);
+VDVR_API void join_crew(Messenger& messenger);
 /// Tells all others that nothing more will come.
 VDVR_API void dismiss(Messenger& messenger);
 

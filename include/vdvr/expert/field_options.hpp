@@ -37,6 +37,7 @@ struct FieldOptions {
   std::optional<double> center;  ///< overrides the scan's; in columns of the prepared projections
   /// What was done to the projections. It is done where they are read (ScanOptions), and recorded here.
   Preparation preparation{};
+  bool operator==(const FieldOptions&) const = default;
 };
 
 }  // namespace vdvr

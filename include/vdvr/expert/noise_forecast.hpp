@@ -44,9 +44,9 @@ struct SigmaForecast {
 };
 
 /// The plan's rates are taken as they are, which suits tolerances no smaller than its own. Nothing of a plan
-/// that was made without foresight or from a part of the scan. Cost: a plan's look at some bricks for each.
-VDVR_API std::vector<SigmaForecast> foresee_in_sigma(const Plan& plan, const BrickSigma& sigma,
-                                                     std::span<const double> multiples);
+/// that was made without a forecast or from a part of the scan. Cost: a plan's look at some bricks for each.
+VDVR_API std::vector<SigmaForecast> forecast_in_sigma(const Plan& plan, const BrickSigma& sigma,
+                                                      std::span<const double> multiples);
 
 /// A plan whose epsilon is what the quietest brick may err by.
 struct PlanInSigma {
@@ -66,11 +66,11 @@ struct FilterForecast {
 };
 /// Of all filters, the same epsilon, or with `multiple` as many sigmas of each. Cost: a plan of each. Throws
 /// what make_plan() throws but ToleranceError.
-VDVR_API std::vector<FilterForecast> foresee_filters(Device& device, const ProjectionSet& scan,
-                                                     const Tolerance& tolerance,
-                                                     std::optional<double> multiple, const ScanNoise& noise,
-                                                     const CertifyOptions& options = {},
-                                                     const Progress& progress = {});
+VDVR_API std::vector<FilterForecast> forecast_filters(Device& device, const ProjectionSet& scan,
+                                                      const Tolerance& tolerance,
+                                                      std::optional<double> multiple, const ScanNoise& noise,
+                                                      const CertifyOptions& options = {},
+                                                      const Progress& progress = {});
 /// How build() holds each brick to `multiple` times its sigma.
 VDVR_API Refinement refinement_in_sigma(const BrickSigma& sigma, double multiple);
 /// What interpolation errs by on average: the root mean square of (V - F) / sigma over covered points between

@@ -105,12 +105,12 @@ struct PictureForecast {
 
 /// Goes through the rounds of the build with what second differences of F say of each level, compared with
 /// what some bricks were measured to err, and no gold besides. `plan`: made to foresee
-/// (PlanSettings::foresee) and not from a part of the scan, with `everywhere` as the tolerance that holds
+/// (PlanSettings::forecast) and not from a part of the scan, with `everywhere` as the tolerance that holds
 /// everywhere; its epsilon is the least that is asked of a brick. Cost: a plan's look at some bricks, and
 /// some rounds' pictures.
-VDVR_API PictureForecast foresee_pictures(Device& device, const ProjectionSet& scan, const Plan& plan,
-                                          const WantedViews& wanted, const PictureRefinementOptions& options,
-                                          double everywhere_abs, StorageChoice storage,
-                                          const Progress& progress = {});
+VDVR_API PictureForecast forecast_pictures(Device& device, const ProjectionSet& scan, const Plan& plan,
+                                           const WantedViews& wanted, const PictureRefinementOptions& options,
+                                           double everywhere_abs, StorageChoice storage,
+                                           const Progress& progress = {});
 
 }  // namespace vdvr

@@ -18,6 +18,11 @@ namespace vdvr {
 struct Tolerance {
   std::optional<double> relative{};  ///< fraction of the reference range, or as the settings' comparison says
   std::optional<double> absolute{};  ///< density units; one of the two is set
+
+  /// As a density. `whole`: what a relative one is a fraction of.
+  [[nodiscard]] double as_density(double whole) const {
+    return absolute ? *absolute : relative.value_or(1) * whole;
+  }
 };
 
 /// What is not given is chosen by trial.
@@ -35,7 +40,7 @@ struct PlanSettings {
   /// log2 of cells per base cell, z, y, x; each divides granularity and cells. None: what is foreseen to
   /// store least, and 0 with isotropic levels.
   std::optional<LevelTriple> coarsening{};
-  bool foresee =
+  bool forecast =
       true;  ///< storage, memory and time, and the paper's bounds beside ours: half of a plan's cost
   /// Of a large scan judge by a part: some views for bounds, a window of rows for everything. What is
   /// foreseen then are estimates, as the plan's notes say, and it cannot be built.
@@ -46,7 +51,7 @@ struct PlanSettings {
 };
 
 struct PreparedScan;
-class Foresight;
+class Forecaster;
 
 struct Plan {
   Grid grid;
@@ -73,8 +78,11 @@ struct Plan {
   /// The filtered scan and the gold that was kept, on the device: a build of the same scan on it goes on from
   /// there. Reset it to free their memory.
   std::shared_ptr<PreparedScan> prepared{};
-  /// Where something was foreseen: foresees builds of other tolerances.
-  std::shared_ptr<Foresight> foresight{};
+  /// Where something was foreseen: forecasts builds of other tolerances.
+  std::shared_ptr<Forecaster> forecaster{};
+
+  /// What its epsilon is a fraction of: other relative tolerances count by it too.
+  [[nodiscard]] double whole() const { return epsilon_abs / epsilon; }
 };
 
 /// Throws ToleranceError naming the binding term and the smallest epsilon that would do.

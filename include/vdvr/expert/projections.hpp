@@ -26,6 +26,7 @@ struct ParallelGeometry {
   std::vector<double> theta_rad;  ///< one angle per view
 
   [[nodiscard]] std::int64_t views() const { return static_cast<std::int64_t>(theta_rad.size()); }
+  bool operator==(const ParallelGeometry&) const = default;
 };
 
 /// What reading and pre-processing did, reported to the user and stored with the certificate.

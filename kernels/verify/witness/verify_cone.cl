@@ -3,12 +3,12 @@
 // Layouts: float table[view][column][row]; View numbers[tile][block][view]; int2 tiles[tile] = first node x,
 // y; float nodes[y][x][all_heights]. What reads like kept/cone_nodes.cl is written a second time: a fault in
 // a shared line would be in what is certified and in what it is held to. Called by
-// host/verify/witness/verify_cone_nodes.cpp.
+// host/verify/witness/cone_nodes.cpp.
 #include "device/lanes.h"
 #include "shared/verify_cone.h"
 #include "shared/verify_nodes.h"
 
-// About the middle of a block, as host/verify/witness/verify_cone_nodes.cpp fills it. xyz of a float4: by how
+// About the middle of a block, as host/verify/witness/cone_nodes.cpp fills it. xyz of a float4: by how
 // much the numerator, or lambda, changes from node to node; w: what it is in the middle. A place counts from
 // the column and the row in `whole`, so chosen that it is positive in all of the block.
 typedef struct {

@@ -3,7 +3,7 @@
 // (docs/error-bounds.md, "What verify does", step 1).
 // Layouts: float table[view][fine column][16], 16 rows or heights; float nodes[y][x][rows_padded]; int2
 // tiles[tile] = first node x, y of a tile; float gold[block][y][x][16 * groups].
-// Called by host/verify/witness/verify_nodes.cpp.
+// Called by host/verify/witness/nodes.cpp.
 #include "device/lanes.h"
 #include "shared/verify_nodes.h"
 

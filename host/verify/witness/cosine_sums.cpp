@@ -1,10 +1,10 @@
 // Sums of cosines in double precision.
-#include "host/verify/witness/verify_cosines.hpp"
+#include "host/verify/witness/cosine_sums.hpp"
 
 #include <cmath>
 #include <numbers>
 
-namespace vdvr::verify_cosines {
+namespace vdvr::cosine_sums {
 
 void sum_rows(const double* a, std::int64_t U, std::int64_t V, const std::vector<double>& basis,
               std::int64_t rows, std::vector<double>& line) {
@@ -28,4 +28,4 @@ std::vector<double> cosine_period(std::int64_t half) {
   return table;
 }
 
-}  // namespace vdvr::verify_cosines
+}  // namespace vdvr::cosine_sums

@@ -1,5 +1,5 @@
 // Angles and cone-beam geometry of a scan.json; see scan_members.hpp.
-#include "host/scan/raw/scan_members.hpp"
+#include "host/scan/open/scan_members.hpp"
 
 #include <fmt/format.h>
 

@@ -1,8 +1,7 @@
 // Weights by Lagrange's formula in double precision, norms by adding them up.
-#include "host/verify/witness/verify_lagrange.hpp"
+#include "host/verify/witness/lagrange.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>

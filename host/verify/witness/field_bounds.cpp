@@ -1,5 +1,5 @@
 // Sups by sampling and Bernstein's inequality, and the bounds they give.
-#include "host/verify/witness/verify_bounds.hpp"
+#include "host/verify/witness/field_bounds.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,13 +7,13 @@
 
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
-#include "host/verify/witness/verify_cosines.hpp"
-#include "host/verify/witness/verify_lagrange.hpp"
+#include "host/verify/witness/cosine_sums.hpp"
+#include "host/verify/witness/lagrange.hpp"
 
 namespace vdvr {
 namespace {
 
-using namespace verify_cosines;
+using namespace cosine_sums;
 
 constexpr double pi = std::numbers::pi;
 constexpr double u = 0x1p-24;            // rounding unit of fp32

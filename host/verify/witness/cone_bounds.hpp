@@ -1,12 +1,12 @@
-// The constants of verify_bounds.hpp for cone beam, on a box: derivatives of lambda^-2 q(u, v) from the sups
+// The constants of field_bounds.hpp for cone beam, on a box: derivatives of lambda^-2 q(u, v) from the sups
 // of q on the detector, and what computed nodes err (docs/error-bounds.md, "What verify does", "Cone beam").
 // Shares nothing with build but the views' matrices.
 #pragma once
 
 #include <span>
 
-#include "host/verify/witness/verify_bounds.hpp"
-#include "host/verify/witness/verify_cone_nodes.hpp"
+#include "host/verify/witness/cone_nodes.hpp"
+#include "host/verify/witness/field_bounds.hpp"
 #include "vdvr/expert/cone_geometry.hpp"
 
 namespace vdvr {

@@ -1,17 +1,15 @@
 // Rounds of refinement without a build: pictures of F within the bounds that bricks are foreseen to have.
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <limits>
 
 #include "host/base/opencl/host_memory.hpp"
 #include "host/base/system/casts.hpp"
-#include "host/certify/foresee.hpp"
+#include "host/certify/forecaster.hpp"
 #include "host/field/fdk/filter_cone.hpp"
-#include "host/picture/refine/brick_outlook.hpp"
+#include "host/picture/refine/brick_forecast.hpp"
 #include "host/picture/refine/picture_rounds.hpp"
-#include "host/scan/units.hpp"
 #include "host/volume/sampler/sampler_terms.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/picture_refinement.hpp"
@@ -56,19 +54,19 @@ struct Tolerances {
   }
 };
 
-class Forecast {
+class PictureForecaster {
  public:
-  Forecast(Device& device, const ProjectionSet& scan, const Plan& plan, const WantedViews& wanted,
-           const PictureRefinementOptions& options, double everywhere_abs, const Progress& progress)
+  PictureForecaster(Device& device, const ProjectionSet& scan, const Plan& plan, const WantedViews& wanted,
+                    const PictureRefinementOptions& options, double everywhere_abs, const Progress& progress)
       : state_(device.state()),
         plan_(plan),
-        foresight_(*plan.foresight),
+        forecaster_(*plan.forecaster),
         progress_(progress),
         host_(state_),
         coverage_(certified_coverage(scan, plan.field)),
         filters_(filter_errors(probe_filters(device))),
         rounds_(options, parts_a_cell) {
-    host_.count(4 * count(std::ssize(plan.base.samples)) + BrickOutlook::bytes(plan.grid, plan.layout),
+    host_.count(4 * count(std::ssize(plan.base.samples)) + BrickForecast::bytes(plan.grid, plan.layout),
                 "pictures foreseen");
     GoldSettings shape{plan.grid, plan.layout.granularity};
     volume_ = as_mixed(plan.base.samples, shape);
@@ -84,14 +82,10 @@ class Forecast {
     const double rest = plan.budget.arithmetic.value +
                         std::max(sampler.buffer.value, sampler.image3d ? sampler.image3d->value : 0.0);
     tolerances_ = {everywhere_abs - rest, std::max(plan.epsilon_abs - rest, 0.0), rest,
-                   std::vector<float>(foresight_.near().size(), std::numeric_limits<float>::infinity())};
-    outlook_.emplace(plan.base, plan.layout, plan.rates.gold,
-                     plan.budget.projection.value + plan.budget.gold.value);
-    std::vector<BrickMeasure> measured = foresight_.measured();
-    for (BrickMeasure& m : measured)
-      for (float* value : {&m.error, &m.slack})
-        *value = static_cast<float>(to_world(static_cast<double>(*value), foresight_.units()));
-    outlook_->compare(measured);
+                   std::vector<float>(forecaster_.near().size(), std::numeric_limits<float>::infinity())};
+    bricks_.emplace(plan.base, plan.layout, plan.rates.gold,
+                    plan.budget.projection.value + plan.budget.gold.value);
+    bricks_->compare(forecaster_.measured());
   }
 
   PictureForecast make(StorageChoice storage) {
@@ -103,7 +97,7 @@ class Forecast {
       const auto start = std::chrono::steady_clock::now();
       const RayField field(volume_, bounds, coverage_);
       const std::vector<float> asked =
-          rounds_.look(field, views_, bounds, outlook_->bricks(), samples.closed, progress_);
+          rounds_.look(field, views_, bounds, bricks_->bricks(), samples.closed, progress_);
       pictures += seconds_since(start);
       raises_.push_back(std::move(samples.raises));
       if (asked.empty() || !tolerances_.take(asked, bounds)) break;
@@ -113,7 +107,7 @@ class Forecast {
     say_bounds(bounds, out);
     const double pixels =
         static_cast<double>(full_.width * full_.height) / static_cast<double>(views_.width * views_.height);
-    foresee_last(storage, pictures * pixels, out);
+    forecast_last(storage, pictures * pixels, out);
     return out;
   }
 
@@ -124,19 +118,19 @@ class Forecast {
   };
   // Bounds of the bricks as asked so far; the samples that they take before closing and after it.
   Samples look_ahead(std::vector<float>& bounds) const {
-    const std::vector<std::uint8_t>& near = foresight_.near();
-    std::vector<BrickOutlook::Level> own(near.size());
+    const std::vector<std::uint8_t>& near = forecaster_.near();
+    std::vector<BrickForecast::Level> own(near.size());
     for (std::size_t i = 0; i < near.size(); ++i)
-      if (near[i]) own[i] = outlook_->level(i, tolerances_.of(i));
-    const std::vector<BrickOutlook::Level> closed = outlook_->closed(own);
-    const std::uint64_t base = count(std::ssize(foresight_.stored()));
+      if (near[i]) own[i] = bricks_->level(i, tolerances_.of(i));
+    const std::vector<BrickForecast::Level> closed = bricks_->closed(own);
+    const std::uint64_t base = forecaster_.stored();
     Samples samples{base, base, std::vector<std::uint8_t>(near.size(), 0)};
     bounds.assign(near.size(), std::numeric_limits<float>::infinity());
     for (std::size_t i = 0; i < near.size(); ++i) {
       if (!near[i]) continue;
-      bounds[i] = static_cast<float>(outlook_->error(i, closed[i]) + tolerances_.rest);
-      samples.open += outlook_->samples(own[i]);
-      samples.closed += outlook_->samples(closed[i]);
+      bounds[i] = static_cast<float>(bricks_->error(i, closed[i]) + tolerances_.rest);
+      samples.open += bricks_->samples(own[i]);
+      samples.closed += bricks_->samples(closed[i]);
       for (std::size_t a = 0; a < 3; ++a)
         samples.raises[i] = std::max(samples.raises[i], static_cast<std::uint8_t>(closed[i][a] - own[i][a]));
     }
@@ -153,34 +147,25 @@ class Forecast {
   }
 
   // Storage and time at the tolerances of the last round, by what some bricks need.
-  void foresee_last(StorageChoice storage, double pictures, PictureForecast& out) {
-    NodeTolerance last(tolerances_.everywhere, tolerances_.by_brick);
-    last.of_all = from_world(last.of_all, foresight_.units());
-    for (float& one : last.by_brick)
-      one = static_cast<float>(from_world(static_cast<double>(one), foresight_.units()));
-    const Foreseen foreseen = foresight_.foresee(last);
-    out.samples_ratio = closing_ * foreseen.samples_ratio;
+  void forecast_last(StorageChoice storage, double pictures, PictureForecast& out) {
+    const BuildForecast build = forecaster_.forecast({tolerances_.everywhere, tolerances_.by_brick});
+    out.samples_ratio = closing_ * build.samples_ratio;
     const auto more = static_cast<double>(out.rounds.size() - 1);
-    out.seconds = plan_.seconds + more * (foreseen.seconds - foreseen.kept_seconds) + pictures;
-    for (const auto& raises : raises_) out.seconds += foresight_.repair_seconds(raises);
-    const IntegerLattice lattice =
-        choose_lattice(foresight_.stored(), storage,
-                       most_rounding(from_world(plan_.epsilon_abs, foresight_.units()),
-                                     plan_.layout.levels == Levels::anisotropic),
-                       foresight_.units().density(), filters_);
+    out.seconds = plan_.seconds + more * (build.seconds - build.kept_seconds) + pictures;
+    for (const auto& raises : raises_) out.seconds += forecaster_.repair_seconds(raises);
     out.bytes =
         static_cast<std::uint64_t>(out.samples_ratio * static_cast<double>(plan_.grid.sample_count())) *
-        bytes_of(lattice.base);
+        bytes_of(forecaster_.lattice(plan_, storage, filters_).base);
     const auto tiles = [&](std::uint64_t bytes) {
       return memory_of_tiles(bytes, state_.memory.limit(), state_.info.is_gpu);
     };
     out.memory_bytes = plan_.memory_bytes - tiles(plan_.tile_bytes) +
-                       tiles(static_cast<std::uint64_t>(closing_ * static_cast<double>(foreseen.tile_bytes)));
+                       tiles(static_cast<std::uint64_t>(closing_ * static_cast<double>(build.tile_bytes)));
   }
 
   opencl::State& state_;
   const Plan& plan_;
-  Foresight& foresight_;
+  Forecaster& forecaster_;
   const Progress& progress_;
   HostMemory host_;
   Coverage coverage_;
@@ -189,19 +174,19 @@ class Forecast {
   MixedVolume volume_;  // F at the grid's samples
   PictureViews full_, views_;
   Tolerances tolerances_{};
-  std::optional<BrickOutlook> outlook_;
+  std::optional<BrickForecast> bricks_;
   std::vector<std::vector<std::uint8_t>> raises_;  // by round
   double closing_ = 1;                             // times the samples, in the last round
 };
 
 }  // namespace
 
-PictureForecast foresee_pictures(Device& device, const ProjectionSet& scan, const Plan& plan,
-                                 const WantedViews& wanted, const PictureRefinementOptions& options,
-                                 double everywhere_abs, StorageChoice storage, const Progress& progress) {
-  if (!plan.foresight)
+PictureForecast forecast_pictures(Device& device, const ProjectionSet& scan, const Plan& plan,
+                                  const WantedViews& wanted, const PictureRefinementOptions& options,
+                                  double everywhere_abs, StorageChoice storage, const Progress& progress) {
+  if (!plan.forecaster)
     throw InputError("pictures are foreseen from a plan of the whole scan that foresees storage and time");
-  return Forecast(device, scan, plan, wanted, options, everywhere_abs, progress).make(storage);
+  return PictureForecaster(device, scan, plan, wanted, options, everywhere_abs, progress).make(storage);
 }
 
 }  // namespace vdvr

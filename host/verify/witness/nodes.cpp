@@ -1,6 +1,6 @@
 // Double precision on the host up to the table of fine columns and the matrix along z, fp32 on the device
 // from there on.
-#include "host/verify/witness/verify_nodes.hpp"
+#include "host/verify/witness/nodes.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,8 +10,8 @@
 #include "host/base/opencl/work_groups.hpp"
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
-#include "host/verify/witness/verify_cosines.hpp"
-#include "host/verify/witness/verify_lagrange.hpp"
+#include "host/verify/witness/cosine_sums.hpp"
+#include "host/verify/witness/lagrange.hpp"
 
 namespace vdvr {
 
@@ -111,16 +111,15 @@ void VerifyNodes::fill(Table& table, std::int64_t first_row, std::int64_t first_
     for (std::int64_t l = 0; l < V; ++l)
       basis[at(l * lanes + r)] = std::cos(pi * static_cast<double>(l) * half / static_cast<double>(V));
   }
-  const auto cosine = verify_cosines::cosine_period(last);
+  const auto cosine = cosine_sums::cosine_period(last);
   parallel_for(table.filled, {}, "", [&](std::int64_t k) {
     std::vector<double> line(at(U * lanes));
-    verify_cosines::sum_rows(field_.coefficients().data() + (first_view + k) * U * V, U, V, basis, lanes,
-                             line);
+    cosine_sums::sum_rows(field_.coefficients().data() + (first_view + k) * U * V, U, V, basis, lanes, line);
     float* out = table.host.data() + k * table.per_view;
-    verify_cosines::sum_columns(
+    cosine_sums::sum_columns(
         line, U, lanes, fine_columns, cosine,
-        [&](std::int64_t n, std::int64_t r, const std::array<double, verify_cosines::lanes>& values) {
-          for (std::int64_t i = 0; i < verify_cosines::lanes; ++i)
+        [&](std::int64_t n, std::int64_t r, const std::array<double, cosine_sums::lanes>& values) {
+          for (std::int64_t i = 0; i < cosine_sums::lanes; ++i)
             out[(n + pad_) * lanes + r + i] = static_cast<float>(values[at(i)] / unit_);
         });
     // Beyond the detector's edges the series is its own mirror image.

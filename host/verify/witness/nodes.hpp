@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "host/base/opencl/array.hpp"
-#include "host/verify/witness/verify_bounds.hpp"
-#include "host/verify/witness/verify_cone_nodes.hpp"
+#include "host/verify/witness/cone_nodes.hpp"
+#include "host/verify/witness/field_bounds.hpp"
 #include "shared/verify_nodes.h"
 #include "vdvr/expert/exact_field.hpp"
 #include "vdvr/expert/grid.hpp"
@@ -55,7 +55,7 @@ class VerifyNodes {
   VerifyNodes(opencl::State& state, const ExactField& field, const Coverage& coverage, const Grid& grid,
               double unit, double furthest);
 
-  /// Back-projects. Cost (of cone beam, verify_cone_nodes.hpp): rows * columns * 12 * (rows + columns / 2)
+  /// Back-projects. Cost (of cone beam, cone_nodes.hpp): rows * columns * 12 * (rows + columns / 2)
   /// multiply-adds a view on the host, 7 multiply-adds a view and value on the device.
   void make(const Part& part);
 

@@ -1,5 +1,5 @@
 // Stratified sampling of bricks (docs/performance.md).
-#include "host/certify/foresee.hpp"
+#include "host/certify/forecaster.hpp"
 
 #include <algorithm>
 #include <array>
@@ -10,6 +10,7 @@
 
 #include "host/base/opencl/host_memory.hpp"
 #include "host/base/system/casts.hpp"
+#include "host/certify/plan_parts.hpp"
 #include "host/volume/bricks.hpp"
 
 namespace vdvr {
@@ -196,7 +197,7 @@ std::vector<std::uint8_t> bricks_to_look_at(GoldStream& stream, const ParallelGe
 }
 
 // A brick that was classified to see what becomes of it.
-struct Foresight::Classified {
+struct Forecaster::Classified {
   double samples = 0;  // of its tile
   BrickMeasure measure;
   bool easy = false;  // measured on coarse gold first
@@ -208,10 +209,9 @@ struct Foresight::Classified {
   }
 };
 
-Foresight::Foresight(std::shared_ptr<PreparedScan> prepared, const Units& units, const GoldSettings& settings,
-                     const Volume& base, std::vector<float> stored, std::vector<std::uint8_t> looked_at)
+Forecaster::Forecaster(std::shared_ptr<PreparedScan> prepared, const GoldSettings& settings,
+                       const Volume& base, std::vector<float> stored, std::vector<std::uint8_t> looked_at)
     : prepared_(std::move(prepared)),
-      units_(units),
       gold_(prepared_->state, prepared_->filtered, prepared_->sups, settings, prepared_->source(settings)),
       stored_(std::move(stored)),
       looked_at_(std::move(looked_at)),
@@ -220,8 +220,8 @@ Foresight::Foresight(std::shared_ptr<PreparedScan> prepared, const Units& units,
       base_samples_(std::ssize(base.samples)),
       field_(prepared_->state, as_mixed(stored_, gold_.fine().settings())) {}
 
-std::vector<Foresight::Classified> Foresight::classify(const NodeTolerance& tolerance,
-                                                       const std::vector<std::uint8_t>& selected) {
+std::vector<Forecaster::Classified> Forecaster::classify(const NodeTolerance& tolerance,
+                                                         const std::vector<std::uint8_t>& selected) {
   const GoldSettings& settings = gold_.fine().settings();
   OpenBricks bricks;
   bricks.grid = settings.grid;
@@ -247,7 +247,7 @@ std::vector<Foresight::Classified> Foresight::classify(const NodeTolerance& tole
 }
 
 // One brick builds the kernels; then whole blocks tell the pace of the first pass.
-double Foresight::first_pass_seconds(const NodeTolerance& tolerance) {
+double Forecaster::first_pass_seconds(const NodeTolerance& tolerance) {
   std::vector<std::uint8_t> one(near_.size(), 0);
   // The middle one of those that are looked at.
   std::int64_t before = std::count(looked_at_.begin(), looked_at_.end(), 1) / 2;
@@ -263,7 +263,10 @@ double Foresight::first_pass_seconds(const NodeTolerance& tolerance) {
   return large.seconds(first, purpose, near_);
 }
 
-Foreseen Foresight::foresee(const NodeTolerance& tolerance) {
+BuildForecast Forecaster::forecast(NodeTolerance tolerance) {
+  const Units& units = prepared_->of.units;
+  tolerance.of_all = from_world(tolerance.of_all, units);
+  for (float& one : tolerance.by_brick) one = static_cast<float>(from_world(static_cast<double>(one), units));
   const GoldSettings& settings = gold_.fine().settings();
   const Index3 n = Bricks(settings.grid, settings.granularity).along();
   const bool screens = gold_.coarse() != nullptr;
@@ -275,7 +278,7 @@ Foreseen Foresight::foresee(const NodeTolerance& tolerance) {
     for (const std::int64_t i : s.candidates) sampled[at(i)] = 1;
   Paces small(gold_);
   const auto classes = classify(tolerance, sampled);
-  Foreseen out;
+  BuildForecast out;
   measured_.clear();
   for (auto& [key, s] : strata)
     for (const std::int64_t i : s.candidates) {
@@ -339,7 +342,21 @@ Foreseen Foresight::foresee(const NodeTolerance& tolerance) {
   return out;
 }
 
-double Foresight::repair_seconds(const std::vector<std::uint8_t>& raises) {
+std::vector<BrickMeasure> Forecaster::measured() const {
+  std::vector<BrickMeasure> out = measured_;
+  for (BrickMeasure& m : out)
+    for (float* value : {&m.error, &m.slack})
+      *value = static_cast<float>(to_world(static_cast<double>(*value), prepared_->of.units));
+  return out;
+}
+
+IntegerLattice Forecaster::lattice(const Plan& plan, StorageChoice storage,
+                                   const FilterErrors& filters) const {
+  return lattice_of(stored_, from_world(plan.epsilon_abs, prepared_->of.units), plan.layout,
+                    prepared_->of.units, storage, filters);
+}
+
+double Forecaster::repair_seconds(const std::vector<std::uint8_t>& raises) {
   double seconds = 0;
   const std::uint8_t most =
       raises.empty() ? std::uint8_t{0} : *std::max_element(raises.begin(), raises.end());

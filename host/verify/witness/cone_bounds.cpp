@@ -1,14 +1,13 @@
 // Polynomials whose coefficients pair with sups of derivatives on the detector.
-#include "host/verify/witness/verify_cone_bounds.hpp"
+#include "host/verify/witness/cone_bounds.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <vector>
 
 #include "host/base/system/casts.hpp"
-#include "host/verify/witness/verify_lagrange.hpp"
+#include "host/verify/witness/lagrange.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

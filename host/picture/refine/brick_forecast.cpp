@@ -1,5 +1,5 @@
 // Errors of interpolation along each axis, which add up (docs/error-bounds.md, section 3).
-#include "host/picture/refine/brick_outlook.hpp"
+#include "host/picture/refine/brick_forecast.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -27,11 +27,11 @@ double median(std::vector<double>& values) {
 
 }  // namespace
 
-std::uint64_t BrickOutlook::bytes(const Grid& grid, const VolumeLayout& layout) {
+std::uint64_t BrickForecast::bytes(const Grid& grid, const VolumeLayout& layout) {
   return 4 * errors_of_brick(layout) * count(Bricks(grid, layout.granularity).size());
 }
 
-BrickOutlook::BrickOutlook(const Volume& base, const VolumeLayout& layout, int rate, double slack)
+BrickForecast::BrickForecast(const Volume& base, const VolumeLayout& layout, int rate, double slack)
     : layout_(layout),
       bricks_(Bricks(base.grid, layout.granularity).along()),
       per_brick_(errors_of_brick(layout)),
@@ -47,7 +47,7 @@ BrickOutlook::BrickOutlook(const Volume& base, const VolumeLayout& layout, int r
 }
 
 // At the spacings of coarse bases what is left out is known; finer ones err as second differences say.
-void BrickOutlook::look_at(const Volume& base, std::size_t brick) {
+void BrickForecast::look_at(const Volume& base, std::size_t brick) {
   // Of a wave of half the Nyquist frequency: the error between samples over an eighth of the second
   // difference.
   constexpr double between_samples = 1.2;
@@ -79,7 +79,7 @@ void BrickOutlook::look_at(const Volume& base, std::size_t brick) {
         }
 }
 
-double BrickOutlook::along(std::size_t brick, std::size_t axis, int level) const {
+double BrickForecast::along(std::size_t brick, std::size_t axis, int level) const {
   const int known = std::min(level, coarsening_[axis]);
   // At the gold rate nothing is left out.
   return level >= finest_[axis]
@@ -88,7 +88,7 @@ double BrickOutlook::along(std::size_t brick, std::size_t axis, int level) const
                           -2 * (level - known));
 }
 
-void BrickOutlook::compare(const std::vector<BrickMeasure>& measured) {
+void BrickForecast::compare(const std::vector<BrickMeasure>& measured) {
   std::vector<double> quotients, slack;
   int rate = 0;
   for (const BrickMeasure& m : measured) rate = std::max(rate, m.rate);
@@ -102,13 +102,13 @@ void BrickOutlook::compare(const std::vector<BrickMeasure>& measured) {
   if (!slack.empty()) slack_ = std::min(slack_, median(slack));
 }
 
-double BrickOutlook::error(std::size_t brick, const Level& level) const {
+double BrickForecast::error(std::size_t brick, const Level& level) const {
   double sum = slack_;
   for (std::size_t a = 0; a < 3; ++a) sum += scale_ * along(brick, a, level[a]);
   return sum;
 }
 
-std::uint64_t BrickOutlook::samples(const Level& level) const {
+std::uint64_t BrickForecast::samples(const Level& level) const {
   if (level == Level{}) return 0;
   std::uint64_t size = 1;
   for (std::size_t a = 0; a < 3; ++a)
@@ -117,7 +117,7 @@ std::uint64_t BrickOutlook::samples(const Level& level) const {
 }
 
 // The axis that errs most is the one to refine: it takes the fewest samples for what it gains.
-BrickOutlook::Level BrickOutlook::level(std::size_t brick, double tolerance) const {
+BrickForecast::Level BrickForecast::level(std::size_t brick, double tolerance) const {
   Level level{};
   while (!(error(brick, level) <= tolerance)) {
     std::array<double, 3> errors{};
@@ -132,7 +132,7 @@ BrickOutlook::Level BrickOutlook::level(std::size_t brick, double tolerance) con
   return level;
 }
 
-std::vector<BrickOutlook::Level> BrickOutlook::closed(const std::vector<Level>& own) const {
+std::vector<BrickForecast::Level> BrickForecast::closed(const std::vector<Level>& own) const {
   std::vector<Level> out = own, before;
   // Across one axis after the other: the largest of three neighbours, twice.
   for (std::size_t across = 0; across < 3; ++across) {

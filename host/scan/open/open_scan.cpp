@@ -1,4 +1,4 @@
-#include "host/scan/raw/open_scan.hpp"
+#include "host/scan/open/open_scan.hpp"
 
 #include <fmt/format.h>
 
@@ -7,9 +7,9 @@
 
 #include "host/files/io/raster_file.hpp"
 #include "host/files/io/text_encoding.hpp"
+#include "host/scan/open/scan_folder.hpp"
 #include "host/scan/raw/hdf5_scan.hpp"
 #include "host/scan/raw/raster_scan.hpp"
-#include "host/scan/raw/scan_folder.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {

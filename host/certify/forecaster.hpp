@@ -7,10 +7,13 @@
 
 #include "host/certify/classify_bricks.hpp"
 #include "host/certify/gold/prepared_scan.hpp"
+#include "host/volume/choose_lattice.hpp"
+#include "vdvr/expert/plan.hpp"
 
 namespace vdvr {
 
-struct Foreseen {
+/// What a build will take.
+struct BuildForecast {
   double samples_ratio = 0;  ///< samples stored per base sample, index and tiles included
   double seconds = 0;        ///< of classification and verification
   double kept_seconds = 0;   ///< of those, what gold takes that is kept
@@ -22,28 +25,30 @@ struct Foreseen {
 /// the lowest to the highest, at places that stand for equal areas of the covered disc.
 std::vector<std::uint8_t> bricks_to_look_at(GoldStream& stream, const ParallelGeometry& geometry);
 
-/// Of what plans look at, foresees builds of different tolerances. Keeps the prepared scan; all but what
-/// `units` says is in those.
-class Foresight {
+/// Of what plans look at, forecasts builds of different tolerances. Keeps the prepared scan, in whose units
+/// it computes; what it takes and gives is in world units.
+class Forecaster {
  public:
-  /// `base` holds F on the grid, `stored` the base samples to store.
-  Foresight(std::shared_ptr<PreparedScan> prepared, const Units& units, const GoldSettings& settings,
-            const Volume& base, std::vector<float> stored, std::vector<std::uint8_t> looked_at);
+  /// `base` holds F on the grid, `stored` the base samples to store: these in the prepared scan's units, as
+  /// the settings are.
+  Forecaster(std::shared_ptr<PreparedScan> prepared, const GoldSettings& settings, const Volume& base,
+             std::vector<float> stored, std::vector<std::uint8_t> looked_at);
 
   /// Classifies a few whole blocks, which tells the time, and some bricks of every stratum of expected error,
   /// which tells the storage, among those to look at. `tolerance` is what the node test may take. Raising
   /// bricks after closing is not foreseen. Cost: about 1 % of the build.
-  Foreseen foresee(const NodeTolerance& tolerance);
+  BuildForecast forecast(NodeTolerance tolerance);
 
   /// What closing takes that adds so many levels to bricks, one in each round of repair: their tiles anew and
   /// their measure, at the pace of what was foreseen last.
   double repair_seconds(const std::vector<std::uint8_t>& raises);
 
-  [[nodiscard]] const Units& units() const { return units_; }
-  [[nodiscard]] GoldRates& gold() { return gold_; }
-  /// Of the base samples, on the bricks that were looked at last.
-  [[nodiscard]] const std::vector<BrickMeasure>& measured() const { return measured_; }
-  [[nodiscard]] const std::vector<float>& stored() const { return stored_; }
+  /// Errors and slack of the base samples, on the bricks that were looked at last.
+  [[nodiscard]] std::vector<BrickMeasure> measured() const;
+  /// Of the base samples to store, of which there are so many.
+  [[nodiscard]] IntegerLattice lattice(const Plan& plan, StorageChoice storage,
+                                       const FilterErrors& filters) const;
+  [[nodiscard]] std::size_t stored() const { return stored_.size(); }
   /// Bricks that may hold a tested node.
   [[nodiscard]] const std::vector<std::uint8_t>& near() const { return near_; }
 
@@ -53,7 +58,6 @@ class Foresight {
   double first_pass_seconds(const NodeTolerance& tolerance);
 
   std::shared_ptr<PreparedScan> prepared_;
-  Units units_;
   GoldRates gold_;
   std::vector<float> stored_;
   std::vector<std::uint8_t> looked_at_, near_;

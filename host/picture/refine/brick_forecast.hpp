@@ -12,11 +12,11 @@
 
 namespace vdvr {
 
-class BrickOutlook {
+class BrickForecast {
  public:
   /// `base` holds F on the grid; `slack` is what even gold may err. Cost: some passes over the samples, over
   /// all cores. Memory: up to 48 bytes a brick.
-  BrickOutlook(const Volume& base, const VolumeLayout& layout, int rate, double slack);
+  BrickForecast(const Volume& base, const VolumeLayout& layout, int rate, double slack);
 
   /// Scales what is expected to what some bricks were measured to err at level 0, in the units of the base.
   void compare(const std::vector<BrickMeasure>& measured);

@@ -25,7 +25,7 @@ struct ConeNodeRates {
 };
 ConeNodeRates cone_node_rates(const ExactField& field, const Coverage& coverage, const Vec3& spacing);
 
-/// What the errors of nodes depend on (verify_cone_bounds.hpp).
+/// What the errors of nodes depend on (cone_bounds.hpp).
 struct ConeNodeFacts {
   double place_u = 0, place_v = 0;  ///< by how much places err, in pixels
   double cancellation = 1;          ///< largest sum of magnitudes of what lambda is made of, over lambda

@@ -1,13 +1,12 @@
 // Sums of cosines over a detector, as `verify` computes them: in double precision, rows side by side. Shared
-// by verify_bounds.cpp and verify_field.cpp; nothing of build uses them.
+// by field_bounds.cpp and verify_field.cpp; nothing of build uses them.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
 
-namespace vdvr::verify_cosines {
+namespace vdvr::cosine_sums {
 
 /// Rows summed side by side.
 constexpr std::int64_t lanes = 8;
@@ -55,4 +54,4 @@ void sum_columns(const std::vector<double>& line, std::int64_t U, std::int64_t r
   }
 }
 
-}  // namespace vdvr::verify_cosines
+}  // namespace vdvr::cosine_sums

@@ -32,9 +32,9 @@ std::string device_of(const std::string& list, int place) {
   return parts[static_cast<std::size_t>(place) % parts.size()];
 }
 
-class Server {
+class CrewProcess {
  public:
-  explicit Server(Messenger& messenger) : messenger_(messenger) {}
+  explicit CrewProcess(Messenger& messenger) : messenger_(messenger) {}
 
   void run() {
     for (;;) {
@@ -161,14 +161,14 @@ class Server {
 
   void take_scan(ByteReader& in) {
     member_.reset();
-    const auto shared = in.get<std::uint64_t>(), samples = in.get<std::uint64_t>();
+    const auto lent = in.get<std::uint64_t>(), samples = in.get<std::uint64_t>();
     const auto mixed = in.get<bool>();
     const auto common = in.get<std::uint64_t>();
     scan_ = {};
     sups_ = {};
     GoldSettings settings;
     in(scan_, sups_, settings);
-    const auto [bytes, owner] = messenger_.shared(shared);
+    const auto [bytes, owner] = messenger_.lent(lent);
     if (bytes.size() != samples * sizeof(float))
       throw ResourceError("the projections, filtered, did not arrive");
     // Nobody writes to a scan.
@@ -176,7 +176,7 @@ class Server {
     scan_.samples = SampleArray(std::span(first, samples), owner);
     member_.emplace(device_->state(), scan_, sups_, settings);
     if (common != 0)
-      member_->share_gold([this, common](std::uint64_t size) { return messenger_.common(common, size); });
+      member_->pool_gold([this, common](std::uint64_t size) { return messenger_.common(common, size); });
     const std::uint64_t share = std::max<std::uint64_t>(device_->state().memory.limit() / 8, least_share);
     budget_ = {std::make_shared<Scratch>(scratch_folder_.empty() ? default_scratch_folder()
                                                                  : std::filesystem::path(scratch_folder_),
@@ -250,7 +250,7 @@ class Server {
 
 }  // namespace
 
-void serve(Messenger& messenger) { Server(messenger).run(); }
+void join_crew(Messenger& messenger) { CrewProcess(messenger).run(); }
 
 void wake(Device& device, const CrewOptions& options) {
   Messenger* messenger = options.messenger;

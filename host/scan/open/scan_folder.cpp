@@ -1,24 +1,22 @@
 // A folder with scan.json: TIFF frames found by pattern, or an HDF5 file, with the geometry beside them
 // (docs/inputs.md). Every name in scan.json is relative to the folder and stays within it.
-#include "host/scan/raw/scan_folder.hpp"
+#include "host/scan/open/scan_folder.hpp"
 
 #include <fmt/format.h>
 #include <fnmatch.h>
 
-#include <algorithm>
 #include <memory>
 #include <set>
 #include <tuple>
 
-#include "host/base/system/limits.hpp"
 #include "host/files/io/raster_file.hpp"
 #include "host/files/io/tiff.hpp"
 #include "host/scan/geometry/circular_geometry.hpp"
 #include "host/scan/geometry/description.hpp"
 #include "host/scan/geometry/nikon_geometry.hpp"
+#include "host/scan/open/scan_members.hpp"
 #include "host/scan/raw/hdf5_scan.hpp"
 #include "host/scan/raw/raster_scan.hpp"
-#include "host/scan/raw/scan_members.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "host/verify/witness/verify_lagrange.hpp"
+#include "host/verify/witness/lagrange.hpp"
 #include "vdvr/expert/grid.hpp"
 #include "vdvr/expert/progress.hpp"
 #include "vdvr/expert/projections.hpp"
@@ -30,7 +30,7 @@ struct SupsByView {
 SupsByView view_sups(std::span<const double> coefficients, const ParallelGeometry& geometry,
                      const Progress& progress);
 
-/// How F is computed at nodes of gold (verify_nodes.hpp).
+/// How F is computed at nodes of gold (nodes.hpp).
 struct NodePath {
   int across = 1;          ///< places of gold to a back-projected node, across z
   bool rows = true;        ///< nodes lie at the detector's rows; else at heights, `along` places to each

@@ -1,5 +1,5 @@
 // Double precision on the host up to the tables and the numbers of blocks, fp32 on the device from there on.
-#include "host/verify/witness/verify_cone_nodes.hpp"
+#include "host/verify/witness/cone_nodes.hpp"
 
 #include <fmt/format.h>
 
@@ -12,7 +12,7 @@
 #include "host/base/opencl/work_groups.hpp"
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
-#include "host/verify/witness/verify_cosines.hpp"
+#include "host/verify/witness/cosine_sums.hpp"
 #include "shared/verify_cone.h"
 #include "shared/verify_nodes.h"
 #include "vdvr/error.hpp"
@@ -138,7 +138,7 @@ VerifyConeNodes::Window VerifyConeNodes::window_of(const Nodes& wanted,
   const auto end = [&](std::size_t a) {
     return static_cast<std::int64_t>(std::floor((high[a] + 0.5) * density)) + cone_points - before + 1;
   };
-  return {first(0), end(0) - first(0), first(1), up(end(1) - first(1), verify_cosines::lanes), magnitude};
+  return {first(0), end(0) - first(0), first(1), up(end(1) - first(1), cosine_sums::lanes), magnitude};
 }
 
 /// Some views at the places of a window, on the host and on the device: [view][column][row].
@@ -170,8 +170,8 @@ void VerifyConeNodes::fill(Table& table, std::int64_t first_view) const {
   const Window& window = table.window;
   table.first_view = first_view;
   table.filled = std::min(table.views, g.views() - first_view);
-  const auto cosine_u = verify_cosines::cosine_period(last),
-             cosine_v = verify_cosines::cosine_period(cone_density * V);
+  const auto cosine_u = cosine_sums::cosine_period(last),
+             cosine_v = cosine_sums::cosine_period(cone_density * V);
   const auto mirrored = [&](std::int64_t n) {
     const std::int64_t m = std::abs(n) % (2 * last);
     return m > last ? 2 * last - m : m;
@@ -186,12 +186,12 @@ void VerifyConeNodes::fill(Table& table, std::int64_t first_view) const {
         for (std::int64_t r = 0; r < rows; ++r)
           basis[at(l * rows + r)] =
               cosine_v[at(l * std::abs(window.first_row + first + r) % (2 * cone_density * V))];
-      verify_cosines::sum_rows(a, U, V, basis, rows, line);
+      cosine_sums::sum_rows(a, U, V, basis, rows, line);
       std::vector<float> dense(at((last + 1) * rows));
-      verify_cosines::sum_columns(
+      cosine_sums::sum_columns(
           line, U, rows, cone_density, cosine_u,
-          [&](std::int64_t n, std::int64_t r, const std::array<double, verify_cosines::lanes>& values) {
-            for (std::int64_t i = 0; i < verify_cosines::lanes; ++i)
+          [&](std::int64_t n, std::int64_t r, const std::array<double, cosine_sums::lanes>& values) {
+            for (std::int64_t i = 0; i < cosine_sums::lanes; ++i)
               dense[at(n * rows + r + i)] = static_cast<float>(values[at(i)] / unit_);
           });
       for (std::int64_t n = 0; n < window.columns; ++n)
