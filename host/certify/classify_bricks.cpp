@@ -25,14 +25,21 @@ bool passes(const BrickMeasure& m, double tolerance) {
   return m.total < 0 || static_cast<double>(m.total) <= tolerance;
 }
 
-}  // namespace
+// The failing cells of a brick on gold of twice the rate.
+CellBox cells_of_finer(CellBox open) {
+  const auto twice = [](std::int16_t n) {
+    return static_cast<std::int16_t>(std::min<int>(2 * std::max<int>(n, 0), INT16_MAX));
+  };
+  std::transform(open.first.begin(), open.first.end(), open.first.begin(), twice);
+  std::transform(open.end.begin(), open.end.end(), open.end.begin(), twice);
+  return open;
+}
 
-namespace {
-
-// Measured on finer gold than before. Either test bounds |V - F|; cells that only the coarser gold tested
-// hold no point of which a certificate speaks.
-BrickMeasure sharper_of(const BrickMeasure& before, BrickMeasure now) {
-  now.total = std::clamp(now.total, 0.0f, before.total);
+// Measured on finer gold than before, where cells failed. Cells that only the coarser gold tested hold no
+// point of which a certificate speaks.
+BrickMeasure on_finer_too(const BrickMeasure& before, BrickMeasure now) {
+  now.total = std::clamp(std::max(now.total, before.passed), 0.0f, before.total);
+  now.passed = std::max(now.passed, before.passed);
   now.error = std::max(now.error, before.error);
   return now;
 }
@@ -51,7 +58,7 @@ ClassifyBricks::ClassifyBricks(JournalledRates& gold, OpenBricks& bricks, HostMe
       host_(host),
       fine_(gold.fine),
       coarse_(gold.coarse),
-      sharper_(gold.sharper),
+      finer_(gold.finer),
       progress_(progress),
       whole_progress_(std::move(progress)),
       refuse_(std::move(refuse)) {}
@@ -120,36 +127,42 @@ void ClassifyBricks::classify_band(const DeviceField& base, const NodeTolerance&
 // Level 0: what each rate leaves undecided, the next one tests. Those that none passes stay in `refined`.
 void ClassifyBricks::screen(const DeviceField& base, const NodeTolerance& tolerance,
                             const std::vector<std::uint8_t>& near, std::vector<std::uint8_t>& refined) {
-  std::vector<JournalledGold*> finer{&*coarse_, &fine_};
-  for (JournalledGold& gold : sharper_) finer.push_back(&gold);
+  std::vector<JournalledGold*> rates{&*coarse_, &fine_};
+  if (finer_) rates.push_back(&*finer_);
   std::vector<std::uint8_t> open = near;
   std::vector<BrickMeasure> fine(near.size());
-  for (JournalledGold* gold : finer) {
+  std::vector<CellBox> cells;
+  for (JournalledGold* gold : rates) {
     std::vector<std::uint8_t> undecided(near.size(), 0);
-    test(*gold, base, tolerance, open, "screen", [&](BrickLevels l) {
+    std::vector<CellBox> failing(near.size());
+    test(*gold, base, tolerance, open, std::move(cells), [&](BrickLevels l) {
       const std::size_t id = at(l.base.brick);
       if (gold == &*coarse_) coarse_slack_[id] = l.base.slack;
-      else l.base = fine[id] = gold == &fine_ ? l.base : sharper_of(fine[id], l.base);
+      else l.base = fine[id] = gold == &fine_ ? l.base : on_finer_too(fine[id], l.base);
       const Verdict verdict = verdict_of(l.base, tolerance.of(id));
       undecided[id] = verdict == Verdict::undecided;
+      failing[id] = cells_of_finer(l.base.open);
       if (verdict != Verdict::within) return;
       refined[id] = 0;
       take(l, true);
     });
     open = std::move(undecided);
+    // The plan's own gold tests whole bricks: its nodes tell the largest error.
+    if (gold != &*coarse_) cells = std::move(failing);
   }
 }
 
 // Level 0 only.
 void ClassifyBricks::test(JournalledGold& gold, const DeviceField& base, const NodeTolerance& tolerance,
-                          const std::vector<std::uint8_t>& selected, const std::string& stage,
+                          const std::vector<std::uint8_t>& selected, std::vector<CellBox> cells,
                           const std::function<void(const BrickLevels&)>& visit) {
   BlockPass pass;
+  pass.cells = std::move(cells);
   pass.ask = BlockPass::Ask::test;
   pass.tolerance = tolerance;
   pass.selected = selected;
   gold.run(
-      std::move(pass), &base, [&](ByteReader in) { read_levels(in, visit); }, progress_, stage);
+      std::move(pass), &base, [&](ByteReader in) { read_levels(in, visit); }, progress_, "screen");
 }
 
 // Levels above 0, with their tiles. On coarse gold only levels that it can test are taken. What is proposed
@@ -233,9 +246,10 @@ void ClassifyBricks::extract(const std::vector<std::uint8_t>& raised) {
 
 void ClassifyBricks::measure_at(JournalledGold& gold, const DeviceField& field,
                                 const NodeTolerance& tolerance, const std::vector<std::uint8_t>& selected,
-                                const std::string& stage,
+                                const std::string& stage, std::vector<CellBox> cells,
                                 const std::function<void(const BrickMeasure&)>& visit) {
   BlockPass pass;
+  pass.cells = std::move(cells);
   pass.ask = BlockPass::Ask::measure;
   pass.tolerance = tolerance;
   pass.selected = selected;
@@ -264,26 +278,28 @@ void ClassifyBricks::measure_band(const DeviceField& field, const std::vector<Le
     std::vector<std::uint8_t> easy = pending;
     for (std::size_t i = 0; i < easy.size(); ++i)
       easy[i] = easy[i] && resolves(coarse_->gold(), stored.at(i)) && is_easy(i, tolerance.of(i));
-    measure_at(*coarse_, field, tolerance, easy, stage, [&](const BrickMeasure& m) {
+    measure_at(*coarse_, field, tolerance, easy, stage, {}, [&](const BrickMeasure& m) {
       if (verdict_of(m, tolerance.of(at(m.brick))) != Verdict::within) return;
       measures_.at(at(m.brick)) = m;
       take_slack(m);
       rest[at(m.brick)] = 0;
     });
   }
-  std::vector<JournalledGold*> finer{&fine_};
-  for (JournalledGold& gold : sharper_) finer.push_back(&gold);
-  for (JournalledGold* gold : finer) {
+  std::vector<JournalledGold*> rates{&fine_};
+  if (finer_) rates.push_back(&*finer_);
+  std::vector<CellBox> cells;
+  for (JournalledGold* gold : rates) {
     std::vector<std::uint8_t> undecided(pending.size(), 0);
-    measure_at(*gold, field, tolerance, rest, stage, [&](const BrickMeasure& m) {
+    std::vector<CellBox> failing(pending.size());
+    measure_at(*gold, field, tolerance, rest, stage, std::move(cells), [&](const BrickMeasure& m) {
       BrickMeasure& known = measures_.at(at(m.brick));
-      known = gold == &fine_ ? m : sharper_of(known, m);
-      const bool decides =
-          gold == finer.back() || verdict_of(m, tolerance.of(at(m.brick))) != Verdict::undecided;
-      if (decides) take_slack(m);
-      else undecided[at(m.brick)] = 1;
+      known = gold == &fine_ ? m : on_finer_too(known, m);
+      take_slack(m);
+      undecided[at(m.brick)] = verdict_of(known, tolerance.of(at(m.brick))) == Verdict::undecided;
+      failing[at(m.brick)] = cells_of_finer(m.open);
     });
     rest = std::move(undecided);
+    cells = std::move(failing);
   }
 }
 
@@ -304,7 +320,7 @@ void ClassifyBricks::sharpen(const DeviceField& field, const NodeTolerance& tole
                       [&](std::size_t a, std::size_t b) { return measures_[a].total > measures_[b].total; });
     std::vector<std::uint8_t> selected(measures_.size(), 0);
     for (std::size_t i = 0; i < most; ++i) selected[loose[i]] = 1;
-    measure_at(fine_, field, tolerance, selected, "verify", [&](const BrickMeasure& m) {
+    measure_at(fine_, field, tolerance, selected, "verify", {}, [&](const BrickMeasure& m) {
       // Either test bounds |V - F|.
       BrickMeasure& known = measures_.at(at(m.brick));
       const float total = std::min(known.total, m.total < 0 ? known.total : m.total);

@@ -73,13 +73,13 @@ class ClassifyBricks {
                     const NodeTolerance& tolerance, const std::vector<std::uint8_t>& pending,
                     const std::string& stage);
   void test(JournalledGold& gold, const DeviceField& base, const NodeTolerance& tolerance,
-            const std::vector<std::uint8_t>& selected, const std::string& stage,
+            const std::vector<std::uint8_t>& selected, std::vector<CellBox> cells,
             const std::function<void(const BrickLevels&)>& visit);
   void refine(JournalledGold& gold, const DeviceField& base, const NodeTolerance& tolerance,
               const std::vector<std::uint8_t>& selected, GoldStream::For purpose);
   void measure_at(JournalledGold& gold, const DeviceField& field, const NodeTolerance& tolerance,
                   const std::vector<std::uint8_t>& selected, const std::string& stage,
-                  const std::function<void(const BrickMeasure&)>& visit);
+                  std::vector<CellBox> cells, const std::function<void(const BrickMeasure&)>& visit);
   void take(const BrickLevels& levels, bool is_bound);
   void take_slack(const BrickMeasure& measure);
   std::vector<std::int64_t> take_tiles(ByteReader& in);  // of which bricks
@@ -87,8 +87,7 @@ class ClassifyBricks {
   OpenBricks& bricks_;
   HostMemory& host_;
   JournalledGold& fine_;
-  std::optional<JournalledGold>& coarse_;
-  std::vector<JournalledGold>& sharper_;
+  std::optional<JournalledGold>&coarse_, &finer_;
   Progress progress_, whole_progress_;  // of a band, of all
   Refuse refuse_;
   std::vector<BrickMeasure> measures_;

@@ -112,7 +112,7 @@ class Paces {
     };
     note(gold_.fine());
     if (gold_.coarse()) note(*gold_.coarse());
-    for (const GoldStream& s : gold_.sharper()) note(s);
+    if (gold_.finer()) note(*gold_.finer());
   }
   double seconds(GoldStream& s, GoldStream::For purpose, const std::vector<std::uint8_t>& bricks) {
     return pace(s, purpose) * s.samples(bricks, purpose);
@@ -331,7 +331,7 @@ BuildForecast Forecaster::forecast(NodeTolerance tolerance) {
   if (screens) {
     GoldStream& coarse = *gold_.coarse();
     for (const Fate stays : {fine_stays, finer_stays}) add(gold_.fine(), For::measuring, bricks[stays]);
-    if (!gold_.sharper().empty()) add(gold_.sharper().front(), For::measuring, bricks[finer_stays]);
+    if (gold_.finer()) add(*gold_.finer(), For::measuring, bricks[finer_stays]);
     add(coarse, For::samples, bricks[coarse_refined]);
     add(coarse, For::proposing, hard);
     add(gold_.fine(), For::samples, bricks[fine_refined]);

@@ -152,7 +152,7 @@ BOOST_AUTO_TEST_CASE(what_finer_gold_accepts_is_within_the_tolerance) {
   std::int64_t all = 0;
   for (const double share : {0.12, 0.16, 0.2, 0.24, 0.28}) {
     Case c(scan, grid_around_axis({10, 10, 11}, 0.7), 8, share);
-    BOOST_REQUIRE(c.gold.sharper().size() == 2u);
+    BOOST_REQUIRE(c.gold.finer() != nullptr);
     std::vector<std::uint8_t> by_finer(c.decided.size(), 0), refined(c.decided.size(), 0);
     for (std::size_t i = 0; i < c.decided.size(); ++i) {
       if (!c.bricks.involved[i]) continue;
@@ -171,8 +171,8 @@ BOOST_AUTO_TEST_CASE(what_finer_gold_accepts_is_within_the_tolerance) {
       BOOST_TEST(static_cast<double>(errors[i].error) <=
                  static_cast<double>(c.decided[i].total) + rounding(c));
     }
-    // What is refined fails at the finest of them, too.
-    const std::vector<BrickMeasure> finest = c.measured_by(c.gold.sharper().back(), refined);
+    // What is refined fails there, too.
+    const std::vector<BrickMeasure> finest = c.measured_by(*c.gold.finer(), refined);
     for (std::size_t i = 0; i < refined.size(); ++i)
       if (refined[i]) BOOST_TEST(static_cast<double>(finest[i].total) > c.tolerance - rounding(c));
   }
@@ -390,14 +390,13 @@ BOOST_AUTO_TEST_CASE(terms_are_those_of_the_gold_that_errs_most) {
     if (coarse == nullptr) throw std::runtime_error("no coarse gold");
     double arithmetic = std::max(coarse->arithmetic(), gold.fine().arithmetic()),
            projection = std::max(coarse->projection(), gold.fine().projection());
-    for (const GoldStream& finer : gold.sharper()) {
-      arithmetic = std::max(arithmetic, finer.arithmetic());
-      projection = std::max(projection, finer.projection());
-    }
+    const GoldStream* finer = gold.finer();
+    if (finer == nullptr) throw std::runtime_error("no finer gold");
+    arithmetic = std::max(arithmetic, finer->arithmetic());
+    projection = std::max(projection, finer->projection());
     BOOST_TEST(gold.arithmetic() == arithmetic);
     BOOST_TEST(gold.projection() == projection);
     // Kept nodes themselves err by less than what is interpolated from them.
-    BOOST_TEST(gold.sharper().size() == 2u);
     if (spacing == 2.0) BOOST_TEST(coarse->projection() < gold.fine().projection());
   }
 }

@@ -58,10 +58,12 @@ BOOST_AUTO_TEST_CASE(settings_and_passes_come_back) {
   p.lattice.least = SampleType::u8;
   p.selected = {1, 0, 1};
   p.level = {{1, 2, 3}};
+  p.cells = {{{1, 2, 3}, {4, 5, 6}}};
   const BlockPass q = again(p);
   BOOST_TEST((q.ask == p.ask && !q.fine && q.rate == 32 && q.purpose == p.purpose && q.number == 9));
   BOOST_TEST((q.tolerance.of_all == 0.1 && q.tolerance.by_brick == p.tolerance.by_brick));
-  BOOST_TEST((q.lattice.least == SampleType::u8 && q.selected == p.selected && q.level == p.level));
+  BOOST_TEST((q.lattice.least == SampleType::u8 && q.selected == p.selected && q.level == p.level &&
+              q.cells == p.cells));
 }
 
 BOOST_AUTO_TEST_CASE(devices_scans_and_works_come_back) {

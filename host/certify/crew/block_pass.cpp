@@ -131,7 +131,7 @@ Bytes compute_record(GoldBatch& batch, const BlockPass& pass, const DeviceField*
       break;
     case BlockPass::Ask::test: {
       std::vector<BrickLevels> levels;
-      for (const BrickMeasure& m : batch.measure(*field, pass.tolerance, selected))
+      for (const BrickMeasure& m : batch.measure(*field, pass.tolerance, selected, false, pass.cells))
         levels.push_back({m, {}, false, {}});
       put_levels(out, levels);
       put_tiles(out, {}, {});
@@ -141,7 +141,8 @@ Bytes compute_record(GoldBatch& batch, const BlockPass& pass, const DeviceField*
       put_classes(out, batch, pass, *field, selected);
       break;
     case BlockPass::Ask::measure:
-      for (const BrickMeasure& m : batch.measure(*field, pass.tolerance, selected, true)) out.put(m);
+      for (const BrickMeasure& m : batch.measure(*field, pass.tolerance, selected, true, pass.cells))
+        out.put(m);
       break;
     case BlockPass::Ask::extract:
       put_extract(out, batch, pass);

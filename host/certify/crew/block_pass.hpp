@@ -32,6 +32,7 @@ struct BlockPass {
   IntegerLattice lattice{};            ///< of tiles
   std::vector<std::uint8_t> selected;  ///< by brick
   std::vector<LevelTriple> level;      ///< by brick, for `extract`
+  std::vector<CellBox> cells;          ///< by brick, those to test or measure; none: all
 };
 
 /// A block among those of all passes, in their order.
@@ -59,7 +60,7 @@ struct BrickLevels {
 };
 
 void members(auto& way, Of<BrickMeasure> auto& m) {
-  way(m.brick, m.total, m.error, m.slack, m.violated, m.rate);
+  way(m.brick, m.total, m.error, m.slack, m.passed, m.open, m.violated, m.rate);
 }
 void members(auto& way, Of<AxisErrors> auto& along) { way(along.of); }
 /// Of `test` and `classify`; tiles follow.

@@ -84,7 +84,7 @@ void members(auto& way, Of<SamplerProbe> auto& p) {
 void members(auto& way, Of<Crew::Kind> auto& k) { way(k.info, k.probe, k.arithmetic); }
 void members(auto& way, Of<BlockPass> auto& p) {
   way(p.ask, p.fine, p.rate, p.purpose, p.number, p.tolerance.of_all, p.tolerance.by_brick, p.lattice,
-      p.selected, p.level);
+      p.selected, p.level, p.cells);
 }
 void members(auto& way, Of<GoldStream::Work> auto& w) { way(w.z, w.height, w.width_x, w.width_y, w.first); }
 

@@ -10,14 +10,19 @@
 namespace vdvr {
 namespace {
 
-// A second finer one leaves a sixteenth of T. What a third would spare does not pay for it.
-constexpr int most_sharper = 1;
 // Cell coordinates of nodes are exact in fp32.
 constexpr std::int64_t most_nodes_across = 1 << 24;
 
 GoldSettings with_coarse(GoldSettings settings) {
   if (settings.rate >= 4 && !settings.grid_only && !settings.window) settings.coarse_rate = settings.rate / 2;
   return settings;
+}
+
+bool is_possible(const GoldSettings& settings, const KeptGold& kept) {
+  const std::array<int, 3> phases = kept.lattice(settings.grid, settings.rate).phases;
+  const auto cells = *std::max_element(settings.grid.cells.begin(), settings.grid.cells.end());
+  return cells * settings.rate <= most_nodes_across &&
+         *std::max_element(phases.begin(), phases.end()) <= most_gold_phases;
 }
 
 }  // namespace
@@ -29,25 +34,18 @@ GoldRates::GoldRates(opencl::State& state, const FilteredScan& scan, const Field
   if (settings.coarse_rate == 0) return;
   GoldSettings coarse = settings;
   coarse.finer_rate = std::exchange(coarse.rate, std::exchange(coarse.coarse_rate, 0));
-  const auto cells = *std::max_element(settings.grid.cells.begin(), settings.grid.cells.end());
+  settings.rate *= 2;
   settings.coarse_rate = 0;
-  for (int i = 0; i < most_sharper; ++i) {
-    settings.rate *= 2;
-    const std::array<int, 3> phases = fine_->source()->kept.lattice(settings.grid, settings.rate).phases;
-    if (cells * settings.rate > most_nodes_across ||
-        *std::max_element(phases.begin(), phases.end()) > most_gold_phases)
-      break;
-    sharper_.emplace_back(state, scan, sups, settings, fine_->source());
+  if (is_possible(settings, fine_->source()->kept)) {
+    finer_.emplace(state, scan, sups, settings, fine_->source());
     coarse.finer_rate = settings.rate;
   }
   coarse_.emplace(state, scan, sups, coarse, fine_->source());
 }
 
 GoldStream& GoldRates::of(int rate) {
-  if (fine_->settings().rate == rate) return *fine_;
-  if (coarse_ && coarse_->settings().rate == rate) return *coarse_;
-  for (GoldStream& gold : sharper_)
-    if (gold.settings().rate == rate) return gold;
+  for (auto* gold : {&fine_, &coarse_, &finer_})
+    if (*gold && (*gold)->settings().rate == rate) return **gold;
   throw std::logic_error("GoldRates: gold of a rate that there is none of");
 }
 

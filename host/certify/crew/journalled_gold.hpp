@@ -73,11 +73,10 @@ struct JournalledRates {
   explicit JournalledRates(GoldRates& gold, BlockRecords* records = nullptr, Crew* crew = nullptr)
       : fine(gold.fine(), true, records, crew) {
     if (GoldStream* stream = gold.coarse()) coarse.emplace(*stream, false, records, crew);
-    for (GoldStream& stream : gold.sharper()) sharper.emplace_back(stream, true, records, crew);
+    if (GoldStream* stream = gold.finer()) finer.emplace(*stream, true, records, crew);
   }
   JournalledGold fine;
-  std::optional<JournalledGold> coarse;
-  std::vector<JournalledGold> sharper;
+  std::optional<JournalledGold> coarse, finer;
 };
 
 }  // namespace vdvr

@@ -1,7 +1,9 @@
 // Launcher of kernels/certify/gold/cell_test.cl: a stored field against F, brick by brick.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "host/base/opencl/array.hpp"
@@ -10,6 +12,12 @@
 #include "shared/gold_shape.h"
 
 namespace vdvr {
+
+/// Cells of gold in a brick: x, y, z of the first, and of what follows the last. All of them, as it is made.
+struct CellBox {
+  std::array<std::int16_t, 3> first{0, 0, 0}, end{INT16_MAX, INT16_MAX, INT16_MAX};
+  bool operator==(const CellBox&) const = default;
+};
 
 /// Blocks of gold on the device and what their cells add to second differences.
 struct GoldOnDevice {
@@ -24,13 +32,15 @@ struct GoldOnDevice {
 /// Per brick of the blocks, [block][z][y][x]; negative where no cell is tested.
 struct CellTestResults {
   std::vector<float> total, error, slack;
+  std::vector<float> passed;            ///< the largest total up to the tolerance, or up to 0
+  std::vector<CellBox> open;            ///< around the cells of larger ones; first > end where there are none
   std::vector<std::uint32_t> violated;  ///< bits as in BrickMeasure
 };
 
-/// `selected` by brick of the grid; `brick_nodes`: granularity * rate. Cost: about 50 operations a node, and
-/// the sampler.
+/// `selected` by brick of the grid; `boxes` per brick of the blocks: the cells to test; `brick_nodes`:
+/// granularity * rate. Cost: about 50 operations a node, and the sampler.
 CellTestResults cell_test(opencl::State& state, const DeviceField& field, const GoldOnDevice& gold,
                           const VdvrCellTest& test, const opencl::DeviceArray<std::uint8_t>& selected,
-                          std::int64_t brick_nodes);
+                          std::span<const CellBox> boxes, std::int64_t brick_nodes);
 
 }  // namespace vdvr

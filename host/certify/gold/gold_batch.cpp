@@ -164,13 +164,17 @@ void GoldBatch::require_slack() {
 }
 
 std::vector<BrickMeasure> GoldBatch::measure(const DeviceField& field, const NodeTolerance& tolerance,
-                                             const opencl::DeviceArray<std::uint8_t>& selected, bool parts) {
+                                             const opencl::DeviceArray<std::uint8_t>& selected, bool parts,
+                                             std::span<const CellBox> cells) {
   std::vector<cl_int4> firsts;
   for (const auto& f : first_brick_) firsts.push_back({{to_int(f[0]), to_int(f[1]), to_int(f[2]), 0}});
   const auto first = opencl::copied<cl_int4>(state_, firsts, "first bricks");
   std::vector<float> tolerances(addend_.size(), static_cast<float>(tolerance.of_all));
-  for (const std::int64_t brick : bricks_)
+  std::vector<CellBox> boxes(addend_.size());
+  for (const std::int64_t brick : bricks_) {
     tolerances[slot(brick)] = static_cast<float>(tolerance.of(at(brick)));
+    if (!cells.empty()) boxes[slot(brick)] = cells[at(brick)];
+  }
   const auto on_device = opencl::copied<float>(state_, tolerances, "tolerances of bricks");
   const auto window = widened_window(errors_, settings_);
   const VdvrCellTest test{.z_first = to_int(shape_.z_first),
@@ -183,7 +187,7 @@ std::vector<BrickMeasure> GoldBatch::measure(const DeviceField& field, const Nod
                           .curvature = eighth * of_curvature_};
   const CellTestResults found =
       cell_test(state_, field, {gold_, margin_, addend_, on_device, first, shape_on_device()}, test, selected,
-                std::int64_t{settings_.granularity} * settings_.rate);
+                boxes, std::int64_t{settings_.granularity} * settings_.rate);
   std::vector<BrickMeasure> out;
   for (const std::int64_t brick : bricks_) {
     const std::size_t i = slot(brick);
@@ -194,6 +198,8 @@ std::vector<BrickMeasure> GoldBatch::measure(const DeviceField& field, const Nod
       m.total = found.total[i];
       m.error = std::max(0.0f, found.error[i]);
       m.slack = found.slack[i];
+      m.passed = found.passed[i];
+      m.open = found.open[i];
       m.violated = found.violated[i];
     }
     out.push_back(m);

@@ -5,9 +5,11 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <span>
 #include <utility>
 #include <vector>
 
+#include "host/certify/gold/cell_test.hpp"
 #include "host/certify/gold/gold_stream.hpp"
 #include "host/certify/gold/node_tolerance.hpp"
 
@@ -27,9 +29,11 @@ struct Slack {
 /// What one brick measured against gold.
 struct BrickMeasure {
   std::int64_t brick = 0;
-  float total = -1;  ///< largest that |V - F| may be, from V - gold and the slack; negative: no tested node
-  float error = 0;   ///< largest |V - gold|
-  float slack = 0;   ///< largest T + P to either side: what even gold may err
+  float total = -1;   ///< largest that |V - F| may be, from V - gold and the slack; negative: no tested node
+  float error = 0;    ///< largest |V - gold|
+  float slack = 0;    ///< largest T + P to either side: what even gold may err
+  float passed = -1;  ///< largest total of a cell that is within the tolerance
+  CellBox open{};     ///< holds the other cells
   std::uint32_t violated =
       0;         ///< one bit per part of the closed brick: 9 z + 3 y + x, 0 low, 1 inside, 2 high
   int rate = 0;  ///< of the gold
@@ -96,9 +100,10 @@ class GoldBatch {
   std::vector<float> extract(const std::vector<std::pair<std::int64_t, LevelTriple>>& tiles);
 
   /// Measures a stored field on every selected brick. `parts`: also which parts of it violate the tolerance,
-  /// at the cost of that brick once more.
+  /// at the cost of that brick once more. `cells`: by brick of the grid those to test; none: all.
   std::vector<BrickMeasure> measure(const DeviceField& field, const NodeTolerance& tolerance,
-                                    const opencl::DeviceArray<std::uint8_t>& selected, bool parts = false);
+                                    const opencl::DeviceArray<std::uint8_t>& selected, bool parts = false,
+                                    std::span<const CellBox> cells = {});
 
  private:
   friend class GoldStream;

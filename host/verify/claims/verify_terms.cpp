@@ -169,10 +169,10 @@ class Totals {
     };
     measure(gold_.fine());
     // Build took finer gold where that left a brick undecided.
-    for (GoldStream& gold : gold_.sharper()) {
+    if (GoldStream* finer = gold_.finer()) {
       selected.assign(selected.size(), 0);
       for (const BrickMeasure& m : std::exchange(low, {})) selected[at(m.brick)] = 1;
-      measure(gold);
+      measure(*finer);
     }
     compare_alone(out, std::move(low), progress);
     compare_constants(out);
@@ -184,7 +184,7 @@ class Totals {
   std::vector<GoldStream*> rates() {
     std::vector<GoldStream*> out{&gold_.fine()};
     if (gold_.coarse()) out.push_back(gold_.coarse());
-    for (GoldStream& gold : gold_.sharper()) out.push_back(&gold);
+    if (gold_.finer()) out.push_back(gold_.finer());
     return out;
   }
 

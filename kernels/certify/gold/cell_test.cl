@@ -5,7 +5,8 @@
 // (docs/error-bounds.md, section 5). Layouts: gold float[block][y + halo][x + halo][gold stride], node z at z
 // + halo, with a halo of at least one node; margin float[block][y + halo][x + halo]; addend float and results
 // [block][brick z][brick y][brick x]. A brick's results are those of its own cells, in whatever block they
-// are computed. Called by host/certify/gold/cell_test.cpp.
+// are computed. Boxes of cells are int[6], the first ones along x, y, z and those after the last. Called by
+// host/certify/gold/cell_test.cpp.
 #include "device/lanes.h"
 #include "device/powers.h"
 #include "shared/cell_test.h"
@@ -269,12 +270,14 @@ int failing_parts(const Place* p, __global const uchar* samples, VdvrGrid grid, 
 #define UNROLL_X
 #endif
 
-// One work-item does VDVR_LANES heights of VDVR_CELLS_X cells along x of a brick. violated: the failing
-// parts, where test.parts asks for them.
+// One work-item does VDVR_LANES heights of VDVR_CELLS_X cells along x of a brick, where these meet the box of
+// cells that is asked for. passed: the largest total that the tolerance allows; open: a box that holds the
+// cells of larger ones. violated: the failing parts, where test.parts asks for them.
 __kernel void cell_test(volatile __global int* total, volatile __global int* error,
-                        volatile __global int* slack_max, volatile __global int* violated,
-                        __global const uchar* samples, __global const uint* bricks, VdvrGrid grid,
-                        __global const float* gold, __global const float* addend,
+                        volatile __global int* slack_max, volatile __global int* passed,
+                        volatile __global int* open, volatile __global int* violated,
+                        __global const int* boxes, __global const uchar* samples, __global const uint* bricks,
+                        VdvrGrid grid, __global const float* gold, __global const float* addend,
                         __global const float* tolerances, __global const float* margin,
                         __global const int4* first_brick, __global const uchar* selected, VdvrGoldShape s,
                         VdvrCellTest test) {
@@ -287,23 +290,34 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
                   first_brick, selected, s) ||
       begin >= p.last_z || first_x >= p.last_x)
     return;
+  __global const int* box = boxes + 6 * p.slot;
+  const int begin_y = box[1], end_x = min(p.last_x, box[3]), end_y = min(p.last_y, box[4]);
+#if VDVR_CELLS_X < VDVR_BRICK_NODES
+  const int begin_x = first_x;  // so that the loop along x has one length
+#else
+  const int begin_x = box[0];
+#endif
+  if (first_x + VDVR_CELLS_X <= box[0] || first_x >= end_x || begin_y >= end_y ||
+      begin + VDVR_LANES <= box[2] || begin >= box[5])
+    return;
   const float tolerance = tolerances[p.slot];
   const VEC rest = (VEC)(addend[p.slot]), unlimited = (VEC)(INFINITY), none = (VEC)(0.0f);
   const int to_x = s.gold_stride, to_y = p.row * s.gold_stride;
   const INT node = begin + p.z * VDVR_BRICK_NODES + INDEX, cell = begin + INDEX;
   const INT low_tested = (node >= test.z_first) & (node <= test.z_last), inside = cell < p.last_z,
             end_tested = (node + 1 >= test.z_first) & (node + 1 <= test.z_last) & inside;
-  VEC largest_total = -unlimited, largest_error = -unlimited, largest_slack = -unlimited;
-  int parts = 0;
+  VEC largest_total = -unlimited, largest_error = -unlimited, largest_slack = -unlimited,
+      largest_passed = -unlimited;
+  int parts = 0, low_x = INT_MAX, low_y = INT_MAX, low_z = INT_MAX, high_x = 0, high_y = 0, high_z = 0;
   Corners before[VDVR_CELLS_X];
 #if VDVR_LANES == 8
   const bool by_planes = (s.rate << grid.coarse_z) >> p.brick.level_z >= 4;
   Planes f;
   if (by_planes) f = planes_of(&p, grid, s.rate, begin);
 #endif
-  for (int iy = 0; iy <= p.last_y; ++iy) {
+  for (int iy = begin_y; iy <= end_y; ++iy) {
     Corners left;
-    __global const float* c = p.gold + ((size_t)iy * p.row + first_x) * s.gold_stride + begin;
+    __global const float* c = p.gold + ((size_t)iy * p.row + begin_x) * s.gold_stride + begin;
     Ends gold_before = gold_at(c - to_x), gold = gold_at(c);
 #if VDVR_LANES == 8
     // Samples below and above this row, at the near and the far end of an interval of columns.
@@ -314,17 +328,19 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
     if (by_planes) {
       jy = min(iy, p.last_y - 1) / f.per_y;
       fy = (float)(iy - jy * f.per_y) * f.of_y;
+      interval = min(begin_x, p.last_x - 1) / f.per_x;
+      in_interval = begin_x - interval * f.per_x;
       row_first = f.first + (size_t)jy * p.brick.stride_y;
-      near_0 = planes_at(&f, samples, &p.brick, row_first);
-      near_1 = planes_at(&f, samples, &p.brick, row_first + p.brick.stride_y);
-      far_0 = planes_at(&f, samples, &p.brick, row_first + 1);
-      far_1 = planes_at(&f, samples, &p.brick, row_first + p.brick.stride_y + 1);
+      near_0 = planes_at(&f, samples, &p.brick, row_first + interval);
+      near_1 = planes_at(&f, samples, &p.brick, row_first + p.brick.stride_y + interval);
+      far_0 = planes_at(&f, samples, &p.brick, row_first + interval + 1);
+      far_1 = planes_at(&f, samples, &p.brick, row_first + p.brick.stride_y + interval + 1);
     }
 #endif
     UNROLL_X
     for (int cell_x = 0; cell_x <= VDVR_CELLS_X; ++cell_x) {
-      const int ix = first_x + cell_x;
-      if (ix > p.last_x) break;
+      const int ix = begin_x + cell_x;
+      if (ix > end_x) break;
       const size_t column = (size_t)iy * p.row + ix;
       const int tested = p.margin[column] >= s.lowest;
       const Ends gold_after = gold_at(c + to_x);
@@ -365,7 +381,7 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
       gold = gold_after;
       if (cell_x > 0) {
         const Corners face = larger(left, here);
-        if (iy > 0) {
+        if (iy > begin_y) {
           const Corners all = larger(before[cell_x - 1], face);
           VEC below = (MORE(none, all.xp) + MORE(none, all.yp) + MORE(none, all.zp)) * test.curvature + rest,
               above = (MORE(none, all.xm) + MORE(none, all.ym) + MORE(none, all.zm)) * test.curvature + rest;
@@ -383,15 +399,24 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
           const VEC both = select(-unlimited, MORE(all.ep + below, all.em + above), counts);
           largest_total = MORE(largest_total, both);
           largest_error = MORE(largest_error, select(-unlimited, MORE(all.ep, all.em), counts));
-          if (test.parts && ANY(both > tolerance)) {
+          largest_passed = MORE(largest_passed, select(-unlimited, both, both <= tolerance));
+          if (ANY(both > tolerance)) {
             float totals[VDVR_LANES], belows[VDVR_LANES], aboves[VDVR_LANES];
             WRITE(both, totals);
             WRITE(below, belows);
             WRITE(above, aboves);
-            for (int i = 0; i < VDVR_LANES; ++i)
-              if (totals[i] > tolerance)
+            for (int i = 0; i < VDVR_LANES; ++i) {
+              if (!(totals[i] > tolerance)) continue;
+              low_z = min(low_z, begin + i);
+              high_z = max(high_z, begin + i + 1);
+              if (test.parts)
                 parts |= failing_parts(&p, samples, grid, s, test, tolerance, ix - 1, iy - 1, begin + i,
                                        belows[i], aboves[i]);
+            }
+            low_x = min(low_x, ix - 1);
+            high_x = max(high_x, ix);
+            low_y = min(low_y, iy - 1);
+            high_y = max(high_y, iy);
           }
           largest_slack = MORE(largest_slack, select(-unlimited, MORE(below, above), counts));
         }
@@ -403,6 +428,17 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
   const float found = LARGEST(largest_slack);
   if (found < 0.0f) return;
   if (parts) atomic_or(violated + p.slot, parts);
+  if (high_x > 0) {
+    volatile __global int* failing = open + 6 * p.slot;
+    atomic_min(failing, low_x);
+    atomic_min(failing + 1, low_y);
+    atomic_min(failing + 2, low_z);
+    atomic_max(failing + 3, high_x);
+    atomic_max(failing + 4, high_y);
+    atomic_max(failing + 5, high_z);
+  }
+  const float within = LARGEST(largest_passed);
+  if (within >= 0.0f) raise(passed + p.slot, within);
   raise(slack_max + p.slot, found);
   raise(total + p.slot, fmax(LARGEST(largest_total), 0.0f));
   raise(error + p.slot, fmax(LARGEST(largest_error), 0.0f));
