@@ -1,6 +1,8 @@
 // What both forms of the kept nodes of cone beam share: a view as the host gives it, and six taps of a place.
 #ifndef VDVR_CONE_TAPS_H
 #define VDVR_CONE_TAPS_H
+#include "device/lanes.h"
+#include "shared/six_taps.h"
 
 // As host/certify/kept/cone_tiles.cpp fills it.
 typedef struct {

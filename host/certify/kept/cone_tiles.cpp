@@ -101,6 +101,7 @@ ConeTiles::ConeTiles(opencl::State& state, const FilteredScan& scan, Upsampler& 
     : state_(state), scan_(scan), upsampler_(upsampler), sups_(sups), lattice_(lattice) {
   in_double_ = ColumnUpsampling::is_possible(state);
   upright_ = std::all_of(scan.views.begin(), scan.views.end(), is_upright);
+  in_runs_ = upright_ && in_double_ && opencl::lanes_of(state.info, to_int(heights)) > 1;
   look_at_views(coverage);
   if (DenseValues::suit(state, scan.geometry, fewest_rows))
     dense_.emplace(state, upsampler, scan, columns_, rows_);
@@ -202,25 +203,27 @@ ConeTiles::Table ConeTiles::table(std::int64_t first, std::int64_t views) {
 
 // --- nodes ---
 
+// Strips are for devices whose work-items have caches of their own.
+ConeTiles::NodesKernel ConeTiles::nodes_kernel(int lanes) {
+  if (in_runs_) return {state_, "certify/kept/cone_runs", "cone_runs"};
+  return {state_,
+          "certify/kept/cone_nodes",
+          "cone_nodes",
+          {{"VDVR_DOUBLE", in_double_ ? "1" : "0"},
+           {"VDVR_UPRIGHT", upright_ ? "1" : "0"},
+           {"VDVR_LANES", std::to_string(lanes)}}};
+}
+
 template <class Real>
 void ConeTiles::launch(const Table& table, const ConePage& page, VdvrConeNodes shape) {
   const Blocks blocks(in_double_, lattice_.groups);
   const std::int64_t of_tile = blocks.count() * table.views;
   const auto together = static_cast<std::size_t>(std::max<std::int64_t>(
       1, static_cast<std::int64_t>(most_view_bytes / sizeof(ViewNumbers<Real>)) / of_tile));
-  const int lanes = opencl::lanes_of(state_.info, to_int(heights));
-  // Strips are for devices whose work-items have caches of their own.
-  const bool in_runs = upright_ && in_double_ && lanes > 1;
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_ulong, VdvrConeNodes> kernel(
-      state_, in_runs ? "certify/kept/cone_runs" : "certify/kept/cone_nodes",
-      in_runs ? "cone_runs" : "cone_nodes",
-      in_runs ? opencl::Defines{{"VDVR_DOUBLE", "1"}}
-              : opencl::Defines{{"VDVR_DOUBLE", in_double_ ? "1" : "0"},
-                                {"VDVR_UPRIGHT", upright_ ? "1" : "0"},
-                                {"VDVR_LANES", std::to_string(lanes)}});
-  const std::uint64_t along_y = count(in_runs ? side / VDVR_CONE_ROWS : side),
-                      along_z = count((lattice_.groups * heights + (in_runs ? VDVR_CONE_RUN : lanes) - 1) /
-                                      (in_runs ? VDVR_CONE_RUN : lanes));
+  const int lanes = opencl::lanes_of(state_.info, to_int(heights)), along = in_runs_ ? VDVR_CONE_RUN : lanes;
+  const std::array<std::uint64_t, 2> items{count(in_runs_ ? side / VDVR_CONE_ROWS : side),
+                                           count((lattice_.groups * heights + along - 1) / along)};
+  NodesKernel kernel = nodes_kernel(lanes);
   for (std::size_t first = 0; first < page.first.size(); first += together) {
     const std::size_t n = std::min(together, page.first.size() - first);
     std::vector<ViewNumbers<Real>> numbers(n * at(of_tile));
@@ -248,7 +251,7 @@ void ConeTiles::launch(const Table& table, const ConePage& page, VdvrConeNodes s
     const opencl::DeviceArray<cl_int2> ranges(state_, std::span<const cl_int2>(wanted), "wanted columns");
     shape.tiles = to_int(static_cast<std::int64_t>(n));
     // On a CPU neighbours in y, which read the same columns and rows, follow one another.
-    kernel(opencl::in_groups(state_.info, {along_y, along_z, n}, {1, 1, 1}, 1), page.out->buffer(),
+    kernel(opencl::in_groups(state_.info, {items[0], items[1], n}, {1, 1, 1}, 1), page.out->buffer(),
            table.values.buffer(), views.buffer(), ranges.buffer(), static_cast<cl_ulong>(first) * shape.tile,
            shape);
     opencl::finish(state_, "kept nodes");  // before the views' numbers go

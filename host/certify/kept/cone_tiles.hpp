@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "host/base/opencl/kernel.hpp"
 #include "host/certify/bounds/dense_values.hpp"
 #include "host/certify/bounds/projection_bounds.hpp"
 #include "host/certify/kept/gold_filters.hpp"
@@ -56,6 +57,9 @@ class ConeTiles {
   /// of eight lanes; and tables of all views. Memory: tables of some views, at most a quarter of what is
   /// left.
   void back_project(std::span<const ConePage> pages, const Progress& progress);
+  /// From now on without strips, as devices do whose work-items share caches: for tests.
+  void take_no_strips() { in_runs_ = false; }
+  [[nodiscard]] bool in_runs() const { return in_runs_; }
 
   /// At least sum_k lambda^-2 sup |q_k| wherever bounds hold.
   [[nodiscard]] double sup() const { return sup_; }
@@ -97,6 +101,8 @@ class ConeTiles {
   void look_at_axis(std::size_t axis, const Coverage& coverage);
   void look_at_views(const Coverage& coverage);
   [[nodiscard]] std::int64_t views_together() const;
+  using NodesKernel = opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_ulong, VdvrConeNodes>;
+  [[nodiscard]] NodesKernel nodes_kernel(int lanes);
   [[nodiscard]] Table table(std::int64_t first, std::int64_t views);
   template <class Real>
   void launch(const Table& table, const ConePage& page, VdvrConeNodes shape);
@@ -115,7 +121,7 @@ class ConeTiles {
   UpsampledColumns columns_, rows_;
   std::int64_t column_stride_ = 0, views_together_ = 1;
   std::optional<DenseValues> dense_;
-  bool upright_ = true, in_double_ = true;
+  bool upright_ = true, in_double_ = true, in_runs_ = true;
   double sup_ = 0, largest_weight_ = 0;
   Vec3 band_{};
   double row_step_ = 0;     // rows of the table from a node to the one above it
