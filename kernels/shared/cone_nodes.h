@@ -6,6 +6,10 @@
 // Nodes of a tile's side, and heights that are computed together.
 #define VDVR_CONE_TILE 32
 #define VDVR_CONE_HEIGHTS 8
+// Of cone_runs.cl: heights of a work-item, rows of a tile alike, and floats of a strip.
+#define VDVR_CONE_RUN 32
+#define VDVR_CONE_ROWS 16
+#define VDVR_CONE_STRIP 768
 
 #ifdef __OPENCL_VERSION__
 typedef ulong VdvrOffset;

@@ -109,6 +109,75 @@ Compared compare(const Chain& chain, KeptGold& kept, const Grid& grid, int rate,
   return r;
 }
 
+// One tile of nodes and more heights than a run has, and what they may err.
+struct Nodes {
+  ConeLattice lattice;
+  std::array<double, 2> first{};
+  std::vector<float> values;
+  double bound = 0;
+};
+
+Nodes nodes_of(Chain& chain, const Coverage& coverage, const Vec3& spacing, bool strips) {
+  Nodes out;
+  ConeLattice& l = out.lattice;
+  l.spacing = spacing;
+  l.claimed = l.reach = 1.5;
+  l.claimed_z = {coverage.heights().first - 1.5, coverage.heights().second + 1.5};
+  l.groups = 5;
+  l.low = -21;
+  l.stride = column_stride(8 * l.groups + 16);
+  ConeTiles tiles(device().state(), chain.filtered, chain.upsampler, chain.sups, coverage, l);
+  if (!strips) tiles.take_no_strips();
+  constexpr std::int64_t side = VDVR_CONE_TILE;
+  opencl::DeviceArray<float> values(device().state(), count(side * side * l.stride), "nodes");
+  values.fill(0.0f);
+  out.first = {-0.4 * side * spacing[0], -0.6 * side * spacing[1]};
+  ConePage page{&values, {out.first}, {}};
+  for (std::int32_t y = 0; y < side; ++y) page.wanted.push_back({y % 3, to_int(side) - 1 - y % 2});
+  tiles.back_project(std::span(&page, 1), {});
+  out.values = values.to_host();
+  const ConeTiles::Errors e = tiles.errors();
+  out.bound = e.interpolation + e.rounding +
+              tiles.largest_weight() * filter_error_bound(chain.upsampler, chain.filtered);
+  BOOST_TEST_MESSAGE("  in runs " << tiles.in_runs() << ": bound " << out.bound / tiles.sup() << " S");
+  return out;
+}
+
+BOOST_AUTO_TEST_CASE(kept_nodes_of_either_form_are_within_their_errors_of_the_field) {
+  for (const Case& c : cases()) {
+    const ProjectionSet scan = noisy_cone(c.shape);
+    Chain chain(scan);
+    const Coverage coverage(chain.filtered.geometry, chain.filtered.views);
+    for (const Vec3& spacing : {Vec3{0.5, 0.5, 0.5}, Vec3{0.3, 0.35, 0.11}})
+      for (const bool strips : {true, false}) {
+        const Nodes nodes = nodes_of(chain, coverage, spacing, strips);
+        std::vector<Vec3> points;
+        std::vector<double> found;
+        for (std::int64_t y = 0; y < VDVR_CONE_TILE; y += 2)
+          for (std::int64_t x = y % 3; x < VDVR_CONE_TILE - 1; x += 3)
+            for (std::int64_t z = y % 4; z < 8 * nodes.lattice.groups; z += 5) {
+              const Vec3 p{nodes.first[0] + static_cast<double>(x) * spacing[0],
+                           nodes.first[1] + static_cast<double>(y) * spacing[1],
+                           static_cast<double>(nodes.lattice.low + z) * spacing[2]};
+              if (coverage.margin(p[0], p[1]) < -1.5 || coverage.margin_z(p[2]) < -1.5) continue;
+              points.push_back(p);
+              found.push_back(
+                  static_cast<double>(nodes.values[at((y * VDVR_CONE_TILE + x) * nodes.lattice.stride + z)]));
+            }
+        BOOST_TEST(points.size() > 50, c.name);
+        double worst = 0;
+        const auto F = chain.exact.at(points);
+        for (std::size_t i = 0; i < F.size(); ++i) worst = std::max(worst, std::abs(found[i] - F[i]));
+        BOOST_TEST(worst <= nodes.bound + chain.exact.rounding(),
+                   c.name << ", strips " << strips << ": error " << worst << ", bound " << nodes.bound);
+        // Bounds are of the worst scan: a wrong row or weight of this one would hide below.
+        BOOST_TEST(worst <= 0.05 * nodes.bound + chain.exact.rounding(), c.name << ", strips " << strips);
+        BOOST_TEST_MESSAGE(c.name << ", " << points.size() << " nodes: error / bound "
+                                  << worst / nodes.bound);
+      }
+  }
+}
+
 BOOST_AUTO_TEST_CASE(gold_of_cone_beam_is_within_its_errors_of_the_field) {
   std::int64_t beyond = 0;
   double closest = 0;

@@ -101,6 +101,7 @@ ConeTiles::ConeTiles(opencl::State& state, const FilteredScan& scan, Upsampler& 
     : state_(state), scan_(scan), upsampler_(upsampler), sups_(sups), lattice_(lattice) {
   in_double_ = ColumnUpsampling::is_possible(state);
   upright_ = std::all_of(scan.views.begin(), scan.views.end(), is_upright);
+  in_runs_ = upright_ && in_double_ && opencl::lanes_of(state.info, to_int(heights)) > 1;
   look_at_views(coverage);
   if (DenseValues::suit(state, scan.geometry, fewest_rows))
     dense_.emplace(state, upsampler, scan, columns_, rows_);
@@ -117,7 +118,6 @@ void ConeTiles::look_at_views(const Coverage& coverage) {
                   0.5 * static_cast<double>(blocks.groups * heights) * lattice_.spacing[2]};
   double beyond_u = 0, beyond_v = 0;
   for (const Corners& part : RegionOutline(coverage, lattice_.claimed).parts(lattice_.claimed_z)) {
-    std::vector<ViewAtPart> at_part;
     double sum = 0;
     for (std::size_t k = 0; k < scan_.views.size(); ++k) {
       const ViewBox seen = view_box(scan_.views[k], part);
@@ -128,24 +128,37 @@ void ConeTiles::look_at_views(const Coverage& coverage) {
         beyond_v = std::max({beyond_v, -0.5 - place[1], place[1] - static_cast<double>(g.rows) + 0.5});
       }
       const double weight = 1 / (seen.lambda_min * seen.lambda_min);
-      ViewAtPart view{weight * sups_.by_view[k].value, {}, {}};
       const auto [places_u, places_v] = places_from_middle(seen, half);
-      for (std::size_t e = 0; e < 3; ++e) {
-        const double of_v = g.rows > 1 ? seen.along_v[e] : 0.0;
-        view.band[e] = pi * lattice_.spacing[e] * (seen.along_u[e] + of_v) / seen.lambda_min;
-        view.rho[e] = lattice_.spacing[e] * seen.growth[e] / seen.lambda_min;
-        band_[e] = std::max(band_[e], view.band[e]);
-      }
+      row_step_ = std::max(row_step_, density * lattice_.spacing[2] * seen.along_v[2] / seen.lambda_min);
       block_reach_ = std::max({block_reach_, places_u, places_v});
       largest_weight_ = std::max(largest_weight_, weight);
-      sum += view.weight;
-      at_part.push_back(view);
+      sum += weight * sups_.by_view[k].value;
     }
     sup_ = std::max(sup_, sum * (1 + 1e-12));
-    at_parts_.push_back(std::move(at_part));
   }
+  for (std::size_t axis = 0; axis < 3; ++axis) look_at_axis(axis, coverage);
   columns_ = upsampled_columns(g.columns, density, std::ceil(beyond_u) + 1);
   rows_ = upsampled_columns(g.rows, density, std::ceil(beyond_v) + 1);
+}
+
+// Filters along z are first, then y, then x: the last one fills nodes that are read, those before it what it
+// reads on either side.
+void ConeTiles::look_at_axis(std::size_t axis, const Coverage& coverage) {
+  const double spacing = lattice_.spacing[axis];
+  const std::pair heights{lattice_.claimed_z.first + lattice_.less_z,
+                          lattice_.claimed_z.second - lattice_.less_z};
+  for (const Corners& part : RegionOutline(coverage, lattice_.claimed - lattice_.less[axis]).parts(heights)) {
+    std::vector<ViewAtPart> at_part;
+    for (std::size_t k = 0; k < scan_.views.size(); ++k) {
+      const ViewBox seen = view_box(scan_.views[k], part);
+      const double of_v = scan_.geometry.rows > 1 ? seen.along_v[axis] : 0.0;
+      at_part.push_back({sups_.by_view[k].value / (seen.lambda_min * seen.lambda_min),
+                         pi * spacing * (seen.along_u[axis] + of_v) / seen.lambda_min,
+                         spacing * seen.growth[axis] / seen.lambda_min});
+      band_[axis] = std::max(band_[axis], at_part.back().band);
+    }
+    at_parts_[axis].push_back(std::move(at_part));
+  }
 }
 
 // --- tables ---
@@ -190,18 +203,27 @@ ConeTiles::Table ConeTiles::table(std::int64_t first, std::int64_t views) {
 
 // --- nodes ---
 
+// Strips are for devices whose work-items have caches of their own.
+ConeTiles::NodesKernel ConeTiles::nodes_kernel(int lanes) {
+  if (in_runs_) return {state_, "certify/kept/cone_runs", "cone_runs"};
+  return {state_,
+          "certify/kept/cone_nodes",
+          "cone_nodes",
+          {{"VDVR_DOUBLE", in_double_ ? "1" : "0"},
+           {"VDVR_UPRIGHT", upright_ ? "1" : "0"},
+           {"VDVR_LANES", std::to_string(lanes)}}};
+}
+
 template <class Real>
 void ConeTiles::launch(const Table& table, const ConePage& page, VdvrConeNodes shape) {
   const Blocks blocks(in_double_, lattice_.groups);
   const std::int64_t of_tile = blocks.count() * table.views;
   const auto together = static_cast<std::size_t>(std::max<std::int64_t>(
       1, static_cast<std::int64_t>(most_view_bytes / sizeof(ViewNumbers<Real>)) / of_tile));
-  const int lanes = opencl::lanes_of(state_.info, to_int(heights));
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_ulong, VdvrConeNodes> kernel(
-      state_, "certify/kept/cone_nodes", "cone_nodes",
-      {{"VDVR_DOUBLE", in_double_ ? "1" : "0"},
-       {"VDVR_UPRIGHT", upright_ ? "1" : "0"},
-       {"VDVR_LANES", std::to_string(lanes)}});
+  const int lanes = opencl::lanes_of(state_.info, to_int(heights)), along = in_runs_ ? VDVR_CONE_RUN : lanes;
+  const std::array<std::uint64_t, 2> items{count(in_runs_ ? side / VDVR_CONE_ROWS : side),
+                                           count((lattice_.groups * heights + along - 1) / along)};
+  NodesKernel kernel = nodes_kernel(lanes);
   for (std::size_t first = 0; first < page.first.size(); first += together) {
     const std::size_t n = std::min(together, page.first.size() - first);
     std::vector<ViewNumbers<Real>> numbers(n * at(of_tile));
@@ -229,10 +251,9 @@ void ConeTiles::launch(const Table& table, const ConePage& page, VdvrConeNodes s
     const opencl::DeviceArray<cl_int2> ranges(state_, std::span<const cl_int2>(wanted), "wanted columns");
     shape.tiles = to_int(static_cast<std::int64_t>(n));
     // On a CPU neighbours in y, which read the same columns and rows, follow one another.
-    kernel(opencl::in_groups(state_.info, {count(side), count(lattice_.groups * heights / lanes), n},
-                             {1, 1, 1}, 1),
-           page.out->buffer(), table.values.buffer(), views.buffer(), ranges.buffer(),
-           static_cast<cl_ulong>(first) * shape.tile, shape);
+    kernel(opencl::in_groups(state_.info, {items[0], items[1], n}, {1, 1, 1}, 1), page.out->buffer(),
+           table.values.buffer(), views.buffer(), ranges.buffer(), static_cast<cl_ulong>(first) * shape.tile,
+           shape);
     opencl::finish(state_, "kept nodes");  // before the views' numbers go
   }
 }
@@ -291,9 +312,12 @@ ConeTiles::Errors ConeTiles::errors(std::int64_t together, Fp64 fp64) {
   // Places: numerator, lambda, quotient and sum; relative to what they move the values by, pi / 8 a column.
   // Blocks are this device's: in double precision they do not matter, and those of single are smaller.
   const double unit = in_double ? 0x1p-53 : unit_roundoff;
-  const double position = 2 * unit * (16 * block_reach_ + 4) * pi / density * sup_;
+  // Of a run of heights, places of eight are floats about their middle: a step three and a half times, what
+  // they add up to, and the fractions of the middle and of each.
+  const double apart = in_double ? unit_roundoff * (7 * row_step_ + 3) : 0.0;
+  const double position = (2 * unit * (16 * block_reach_ + 4) + apart) * pi / density * sup_;
   // Six products along u and one along v, their sum over the views of a chunk, eight lanes, and chunks;
-  // lambda^-2, which a float place makes err more.
+  // lambda^-2, which a float place makes err more. Runs of heights add up four views at a time: no more sums.
   const double roundings = 6 + 1 + 3 + roundings_of_sum(g.views(), together) + (in_double ? 3 : 24);
   out.rounding = square * entries + position + 2 * six.norm * six.rounding * sup_ +
                  1.01 * unit_roundoff * roundings * square * sup_ +
@@ -310,13 +334,12 @@ const ProjectiveError& ConeTiles::error_of(std::size_t axis, const GoldFilter& f
 
 // The largest sum over the views of what a filter errs along an axis.
 double ConeTiles::largest(std::size_t axis, const ProjectiveError& error) const {
-  double most = 0;
-  for (const auto& views : at_parts_) {
-    double sum = 0;
-    for (const ViewAtPart& view : views) sum += view.weight * error.at(view.band[axis], view.rho[axis]);
-    most = std::max(most, sum);
-  }
-  return most * (1 + 1e-12);
+  const auto& parts = at_parts_[axis];
+  std::vector<double> sums(parts.size(), 0.0);
+  parallel_for(static_cast<std::int64_t>(parts.size()), {}, "", [&](std::int64_t i) {
+    for (const ViewAtPart& view : parts[at(i)]) sums[at(i)] += view.weight * error.at(view.band, view.rho);
+  });
+  return (sums.empty() ? 0.0 : *std::ranges::max_element(sums)) * (1 + 1e-12);
 }
 
 ConeTiles::BestFilter ConeTiles::best_filter(int phases, std::size_t axis, int taps) const {

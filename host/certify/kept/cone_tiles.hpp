@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "host/base/opencl/kernel.hpp"
 #include "host/certify/bounds/dense_values.hpp"
 #include "host/certify/bounds/projection_bounds.hpp"
 #include "host/certify/kept/gold_filters.hpp"
@@ -29,8 +30,10 @@ struct ConeLattice {
   double reach = 0;    ///< of nodes, across z, beyond the covered region
   double claimed = 0;  ///< alike, at most `reach`: as far as bounds hold; beyond it nodes are finite
   std::pair<double, double> claimed_z{};  ///< the heights between which they hold
-  std::int64_t low = 0, groups = 0;       ///< the lowest height, and how many groups of eight
-  std::int64_t stride = 0;                ///< floats from column to column of a tile, at least all heights
+  Vec3 less{};        ///< by axis, by how much less far than `claimed` filters along it fill nodes
+  double less_z = 0;  ///< alike of all of them, than `claimed_z`
+  std::int64_t low = 0, groups = 0;  ///< the lowest height, and how many groups of eight
+  std::int64_t stride = 0;           ///< floats from column to column of a tile, at least all heights
 };
 
 /// Tiles of 32 x 32 columns of nodes on the device, one after another: float [tile][y][x][stride].
@@ -49,14 +52,19 @@ class ConeTiles {
   ConeTiles(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, const FieldSups& sups,
             const Coverage& coverage, const ConeLattice& lattice);
 
-  /// Adds F at the nodes to what the pages hold. Cost: 12 multiply-adds of eight lanes a view and node, and
-  /// tables of all views. Memory: tables of some views, at most a quarter of what is left.
+  /// Adds F at the nodes to what the pages hold. Cost: with upright detectors on a CPU six multiply-adds of
+  /// eight lanes a view and node and six of single ones for each row of the table between two nodes, else 12
+  /// of eight lanes; and tables of all views. Memory: tables of some views, at most a quarter of what is
+  /// left.
   void back_project(std::span<const ConePage> pages, const Progress& progress);
+  /// From now on without strips, as devices do whose work-items share caches: for tests.
+  void take_no_strips() { in_runs_ = false; }
+  [[nodiscard]] bool in_runs() const { return in_runs_; }
 
   /// At least sum_k lambda^-2 sup |q_k| wherever bounds hold.
   [[nodiscard]] double sup() const { return sup_; }
   [[nodiscard]] double largest_weight() const { return largest_weight_; }  ///< at least lambda^-2, alike
-  /// At least the frequency of any view's part at such nodes, radians a node.
+  /// At least the frequency of any view's part where a filter fills, radians a node.
   [[nodiscard]] double band(std::size_t axis) const { return band_[axis]; }
   [[nodiscard]] const ConeLattice& lattice() const { return lattice_; }
 
@@ -85,14 +93,16 @@ class ConeTiles {
     opencl::DeviceArray<float> values;
     std::int64_t first = 0, views = 0;
   };
-  // Of a view at the places of a part of the region: lambda^-2 sup |q|, and by axis the band and rho of
+  // Of a view at the places of a part of the region: lambda^-2 sup |q|, and along an axis the band and rho of
   // projective_error.hpp.
   struct ViewAtPart {
-    double weight = 0;
-    Vec3 band{}, rho{};
+    double weight = 0, band = 0, rho = 0;
   };
+  void look_at_axis(std::size_t axis, const Coverage& coverage);
   void look_at_views(const Coverage& coverage);
   [[nodiscard]] std::int64_t views_together() const;
+  using NodesKernel = opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_ulong, VdvrConeNodes>;
+  [[nodiscard]] NodesKernel nodes_kernel(int lanes);
   [[nodiscard]] Table table(std::int64_t first, std::int64_t views);
   template <class Real>
   void launch(const Table& table, const ConePage& page, VdvrConeNodes shape);
@@ -111,11 +121,12 @@ class ConeTiles {
   UpsampledColumns columns_, rows_;
   std::int64_t column_stride_ = 0, views_together_ = 1;
   std::optional<DenseValues> dense_;
-  bool upright_ = true, in_double_ = true;
+  bool upright_ = true, in_double_ = true, in_runs_ = true;
   double sup_ = 0, largest_weight_ = 0;
   Vec3 band_{};
+  double row_step_ = 0;     // rows of the table from a node to the one above it
   double block_reach_ = 0;  // columns or rows of the table from a block's middle to its nodes
-  std::vector<std::vector<ViewAtPart>> at_parts_;
+  std::array<std::vector<std::vector<ViewAtPart>>, 3> at_parts_;  // where filters along the axis fill
   std::map<const GoldFilter*, ProjectiveError> filters_;
 };
 

@@ -135,7 +135,7 @@ void KeptGold::resample_heights(const GoldLattice& lattice, const GoldBox& box) 
       const auto put = [&](std::int64_t t, double weight) {
         if (first + t >= 0 && first + t < s.count) row[first + t] = weight;
       };
-      if (phase == 0) put(half_taps_ - 1, 1);
+      if (phase == 0) put(half_taps_[2] - 1, 1);
       else
         for (std::int64_t t = 0; t < f.taps; ++t)
           put(t, static_cast<double>(f.weights[at(phase * f.taps + t)]));

@@ -36,8 +36,6 @@ KeptGold::KeptGold(opencl::State& state, const FilteredScan& scan, const FieldSu
       reach_(reach),
       heights_bytes_(heights_bytes),
       interpolation_(interpolation),
-      // Where a view looks closest, half a pixel at the axis is more than half of its own.
-      half_taps_(scan.views.empty() ? 8 : 10),
       coverage_(scan.geometry, scan.views),
       common_bytes_(state) {
   const ParallelGeometry& g = scan.geometry;
@@ -50,7 +48,7 @@ KeptGold::KeptGold(opencl::State& state, const FilteredScan& scan, const FieldSu
   }
   // Filters read across the edge of what is kept, and nowhere may a column be clamped.
   const double margin =
-      reach + (static_cast<double>(half_taps_) + 1) * std::hypot(spacing_[0], spacing_[1]) + g.pitch_u;
+      reach + (static_cast<double>(half_taps_[0]) + 1) * std::hypot(spacing_[0], spacing_[1]) + g.pitch_u;
   reach_ = margin - g.pitch_u;
   columns_ = upsampled_columns(g.columns, upsampling, margin / g.pitch_u);
   stride_ = column_stride(g.rows);
@@ -61,14 +59,29 @@ void KeptGold::set_spacing() {
 }
 
 // Cone beam: where a view looks closest its frequencies are the highest, and half a pixel at the axis may be
-// too far. Heights are kept themselves: no two nodes see the same rows.
+// too far for so many taps. More of them cost less than nodes that are twice as dense. Heights are kept
+// themselves: no two nodes see the same rows.
 void KeptGold::keep_heights(double reach) {
   // Of the largest value that F can have, what filters along an axis may err: the remainder sees it 16 times.
-  constexpr double most_error = 2e-5;
+  // A fifth of it where a few more taps do that.
+  constexpr double most_error = 2e-5, enough = 4e-6;
+  constexpr std::int64_t fewest = 10, most = 14;
+  half_taps_ = {fewest, fewest, fewest};
+  const auto improve = [&](std::size_t a) {  // x and y share theirs
+    if (half_taps_[a] < most) half_taps_[a] += 2;
+    else {
+      rates_[a] *= 2;
+      half_taps_[a] = fewest;
+    }
+    if (a > 0) return;
+    rates_[1] = rates_[0];
+    half_taps_[1] = half_taps_[0];
+  };
   for (bool dense = false; !dense;) {
     const ConeLattice lattice = cone_lattice(reach);
     if (lattice.reach < lattice.claimed) {  // tiles whose middle reaches a source: smaller ones
-      rates_[0] = rates_[1] *= 2;
+      half_taps_[0] = most;
+      improve(0);
       set_spacing();
       continue;
     }
@@ -76,10 +89,10 @@ void KeptGold::keep_heights(double reach) {
     cone_.emplace(state_, scan_, upsampler_, sups_, coverage_, lattice);
     dense = true;
     for (const std::size_t a : {std::size_t{0}, std::size_t{2}}) {
-      if (cone_->best_filter(2, a, to_int(2 * half_taps_)).error <= most_error * cone_->sup()) continue;
+      const double allowed = half_taps_[a] < most ? enough : most_error;
+      if (cone_->best_filter(2, a, to_int(2 * half_taps_[a])).error <= allowed * cone_->sup()) continue;
       dense = false;
-      rates_[a] *= 2;
-      if (a == 0) rates_[1] *= 2;
+      improve(a);
     }
     set_spacing();
   }
@@ -118,7 +131,8 @@ double KeptGold::room_to_sources(double from, const std::pair<double, double>& h
 // from some way around.
 ConeLattice KeptGold::cone_lattice(double reach) const {
   constexpr double cells_around = 4;
-  const double around = cells_around * grid_.spacing[2] + 2 * static_cast<double>(half_taps_) * spacing_[2];
+  const double around =
+      cells_around * grid_.spacing[2] + 2 * static_cast<double>(half_taps_[2]) * spacing_[2];
   const auto node = [&](double z) { return (z - grid_.origin[2]) / spacing_[2]; };
   const auto margin = static_cast<double>(2 * run_margin);
   const double low = std::clamp(node(coverage_.heights().first - around), -margin, 1e9),
@@ -129,11 +143,15 @@ ConeLattice KeptGold::cone_lattice(double reach) const {
   out.groups = floor_div(static_cast<std::int64_t>(std::ceil(high)) - out.low, 8) + 1;
   out.stride = column_stride(8 * out.groups + 16);
   // Filters read around nodes with bounds.
-  const double taps = static_cast<double>(half_taps_) + 1, diagonal = std::hypot(spacing_[0], spacing_[1]);
-  out.claimed = claimed()[0] + taps * diagonal;
-  const double claimed_z = claimed()[2] + taps * spacing_[2];
+  const double diagonal = std::hypot(spacing_[0], spacing_[1]),
+               read = (static_cast<double>(half_taps_[0]) + 1) * diagonal,
+               claimed_z = claimed()[2] + (static_cast<double>(half_taps_[2]) + 1) * spacing_[2];
+  out.claimed = claimed()[0] + read;
+  // Along x filters fill gold itself, along y what those read.
+  out.less = {read, read - static_cast<double>(half_taps_[0]) * spacing_[0], 0};
+  out.less_z = claimed_z - claimed()[2];
   out.claimed_z = {coverage_.heights().first - claimed_z, coverage_.heights().second + claimed_z};
-  out.reach = std::min(std::max(reach + taps * diagonal, out.claimed),
+  out.reach = std::min(std::max(reach + read, out.claimed),
                        out.claimed + room_to_sources(out.claimed, out.claimed_z));
   return out;
 }
@@ -163,8 +181,8 @@ KeptGold::Span KeptGold::span(const GoldLattice& lattice, std::size_t axis, cons
   const std::int64_t begin = phases > 1 ? floor_div(first, phases) : first * step;
   s.intervals = phases > 1 ? floor_div(last, phases) - begin + 1 : box.nodes[axis];
   s.skipped = phases > 1 ? first - begin * phases : 0;
-  s.low = begin - half_taps_ + 1;
-  s.count = (s.intervals - 1) * step + 2 * half_taps_;
+  s.low = begin - half_taps_[axis] + 1;
+  s.count = (s.intervals - 1) * step + 2 * half_taps_[axis];
   return s;
 }
 

@@ -194,7 +194,7 @@ class KeptGold {
   double reach_;
   std::uint64_t heights_bytes_;
   Interpolation interpolation_;
-  std::int64_t half_taps_;  // of filters between kept nodes
+  Index3 half_taps_{8, 8, 8};  // of filters between kept nodes, by axis
   Coverage coverage_;
   UpsampledColumns columns_;
   Index3 rates_{1, 1, 1};

@@ -19,10 +19,10 @@ const GoldFilter& KeptGold::filter_of(int phases, std::size_t axis) {
   if (const auto known = filters_.find(key); known != filters_.end()) return known->second;
   const double pitch = key.second == 2 ? scan_.geometry.pitch_v : scan_.geometry.pitch_u;
   const double spacing = key.second == 2 ? spacing_[2] : std::max(spacing_[0], spacing_[1]);
+  const int taps = to_int(2 * half_taps_[key.second]);
   return filters_
-      .emplace(key, cone_ ? cone_->best_filter(phases, key.second, to_int(2 * half_taps_)).filter.value()
-                          : design_gold_filter(phases, std::min(pi / 2, pi * spacing / pitch),
-                                               to_int(2 * half_taps_)))
+      .emplace(key, cone_ ? cone_->best_filter(phases, key.second, taps).filter.value()
+                          : design_gold_filter(phases, std::min(pi / 2, pi * spacing / pitch), taps))
       .first->second;
 }
 
@@ -37,10 +37,11 @@ constexpr double curved_apart = 1.5;
 
 KeptGold::ConeParts KeptGold::cone_parts(const GoldFilter& x, const GoldFilter& y, const GoldFilter& z) {
   // What the filters round: a product in runs along z, one more than taps in either filter across z.
-  const double sums = 2 * static_cast<double>(half_taps_) + 1;
-  const double rounding = unit_roundoff * cone_->sup() *
-                          (z.norm * (product_error(2 * half_taps_ + 8, AlongZ::run) + 2) * x.norm * y.norm +
-                           (x.rate > 1 ? sums : 0.0) * x.norm + (y.rate > 1 ? sums : 0.0) * x.norm * y.norm);
+  const double sums = 2 * static_cast<double>(half_taps_[0]) + 1;
+  const double rounding =
+      unit_roundoff * cone_->sup() *
+      (z.norm * (product_error(2 * half_taps_[2] + 8, AlongZ::run) + 2) * x.norm * y.norm +
+       (x.rate > 1 ? sums : 0.0) * x.norm + (y.rate > 1 ? sums : 0.0) * x.norm * y.norm);
   return {cone_->errors(), cone_->filter_error(x, y, z), rounding};
 }
 
@@ -133,10 +134,10 @@ GoldErrors KeptGold::parallel_errors(const GoldLattice& lattice, Fp64 fp64) {
   // height by itself, product and filter; of each node by itself, one more than taps in either filter across
   // z.
   const double shared = chain.position, rows = gain_v * (1 + z.sup) * (chain.columns + chain.summation);
-  const double between = !few_rows() ? product_error(2 * half_taps_ + 8, AlongZ::run) + 2 : 0.0;
+  const double between = !few_rows() ? product_error(2 * half_taps_[2] + 8, AlongZ::run) + 2 : 0.0;
   const double heights = unit_roundoff * S * z.norm *
                          ((g.rows > 1 ? (product_error(g.rows, AlongZ::run) + 2) * gain_v : 0.0) + between);
-  const double sums = 2 * static_cast<double>(half_taps_) + 1;
+  const double sums = 2 * static_cast<double>(half_taps_[0]) + 1;
   const double apart = (x.rate > 1 ? sums : 0.0) * unit_roundoff * x.norm * S * (1 + y.sup) +
                        (y.rate > 1 ? sums : 0.0) * unit_roundoff * x.norm * y.norm * S;
   const double curved_heights = (bend(x) * y.norm + x.norm * bend(y) + 4 * nodes) / 8;

@@ -1,48 +1,13 @@
 // Kept nodes of cone beam: out[tile][y][x][height] += sum_k lambda^-2 q_k(u, v), by six taps both ways from
 // tables of eight values a pixel (docs/error-bounds.md, section 16). Layouts: float table[view][column][row];
-// VIEW views[tile][block][view]; int2 wanted[tile][y]: first and last column of nodes. Places are in columns
-// and rows of the table, relative to the middle of a block of nodes. Neighbours in y, which read the same
-// columns and rows, follow one another. Called by host/certify/kept/cone_tiles.cpp.
+// ConeView views[tile][block][view]; int2 wanted[tile][y]: first and last column of nodes. Places are in
+// columns and rows of the table, relative to the middle of a block of nodes. Neighbours in y, which read the
+// same columns and rows, follow one another. Called by host/certify/kept/cone_tiles.cpp.
 #include "device/lanes.h"
 #include "shared/cone_nodes.h"
 #include "shared/six_taps.h"
 
-// As host/certify/kept/cone_tiles.cpp fills it.
-typedef struct {
-  REAL step_u[3], part_u;
-  REAL step_v[3], part_v;
-  REAL step_lambda[3], lambda;
-  REAL whole_u, whole_v, unused[2];
-} View;
-
-// Of taps -2 .. 3, and two that read what is not used.
-#define LANES(a, b, c, d, e, f) (float8)(a, b, c, d, e, f, 0.0f, 0.0f)
-#define FIRST_OF(a, b, c) a
-#define SECOND_OF(a, b, c) b
-#define THIRD_OF(a, b, c) c
-// A list becomes arguments where it is handed on: OpenCL C has no macros of any number of them.
-#define TAKE(pick, list) pick(list)
-#define TAP(pick, kind, tap) TAKE(pick, VDVR_SIX_##kind##_##tap)
-#define COEFFICIENTS(pick, kind, sign)                                                        \
-  LANES(TAP(pick, kind, A), TAP(pick, kind, B), TAP(pick, kind, C), sign(TAP(pick, kind, C)), \
-        sign(TAP(pick, kind, B)), sign(TAP(pick, kind, A)))
-#define SAME(x) (x)
-#define OPPOSITE(x) (-(x))
-#define EVEN_OF(pick) COEFFICIENTS(pick, EVEN, SAME)
-#define ODD_OF(pick) COEFFICIENTS(pick, ODD, OPPOSITE)
-
-static inline __attribute__((always_inline)) float8 taps(float g) {
-  const float s = g * g;
-  return fma((float8)(g),
-             VDVR_SIX_FUSED_HORNER(float8, s, ODD_OF(FIRST_OF), ODD_OF(SECOND_OF), ODD_OF(THIRD_OF)),
-             VDVR_SIX_FUSED_HORNER(float8, s, EVEN_OF(FIRST_OF), EVEN_OF(SECOND_OF), EVEN_OF(THIRD_OF)));
-}
-
-static inline __attribute__((always_inline)) float sum_of(float8 v) {
-  const float4 four = v.lo + v.hi;
-  const float2 two = four.lo + four.hi;
-  return two.x + two.y;
-}
+#include "device/cone_taps.h"
 
 #define COLUMN(j) vload8(0, from + (size_t)(j)*column_stride)
 // What a view adds at one height: six columns of eight rows, by weights along u, then along v.
@@ -71,7 +36,7 @@ static inline __attribute__((always_inline)) float sum_of(float8 v) {
   }
 #define PUT(n) to[n] += sum_of(sum##n);
 
-__kernel void cone_nodes(__global float* out, __global const float* table, __global const View* views,
+__kernel void cone_nodes(__global float* out, __global const float* table, __global const ConeView* views,
                          __global const int2* wanted, ulong first, VdvrConeNodes s) {
   const int y = (int)get_global_id(0), height = (int)get_global_id(1) * VDVR_LANES,
             tile = (int)get_global_id(2), group = height / VDVR_CONE_HEIGHTS;
@@ -86,7 +51,7 @@ __kernel void cone_nodes(__global float* out, __global const float* table, __glo
   for (int x = range.x; x <= range.y; ++x) {
     const int block_x = x / s.block_side;
     const REAL dx = (REAL)((float)(x - block_x * s.block_side) - half_side);
-    __global const View* v =
+    __global const ConeView* v =
         views + ((size_t)tile * s.blocks + (size_t)(block_z * s.blocks_across + block_y) * s.blocks_across +
                  block_x) *
                     views_all;

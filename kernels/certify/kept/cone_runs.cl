@@ -1,0 +1,133 @@
+// Kept nodes of cone beam where all detectors stand upright: u, lambda and the weights of six columns belong
+// to a whole column of nodes. They are applied once to the rows that a run of heights reads, which gives a
+// strip, and each height takes six rows of it (docs/error-bounds.md, section 16). Layouts and what is added
+// are those of cone_nodes.cl. A work-item does a run of heights of some rows of a tile, some views at a time:
+// what they read stays in caches. In double precision only. Called by host/certify/kept/cone_tiles.cpp.
+#define VDVR_LANES 8
+#define VDVR_DOUBLE 1
+#include "device/cone_taps.h"
+#include "device/lanes.h"
+#include "shared/cone_nodes.h"
+
+#define RUN VDVR_CONE_RUN
+#define GROUPS (RUN / VDVR_LANES)
+#if GROUPS != 4
+#error "the middles of a run's groups of heights are a vector of four"
+#endif
+// Views whose strips are made together, and vectors of a strip.
+#define TOGETHER 4
+#define CHUNKS (VDVR_CONE_STRIP / 16)
+
+// What a column of nodes reads of a view: strip, and by height the first of six rows, and the place g
+// between the two in the middle. Arrays on purpose: what is taken from them by the element would
+// cost more from registers.
+typedef struct {
+  float16 strip[CHUNKS];
+  float g[RUN];
+  int row[RUN];
+} Seen;
+
+static ALWAYS_INLINE int floor_of(double v) {
+  const int cut = (int)v;
+  return cut - ((double)cut > v);
+}
+
+#define COLUMN(j) (*(__global const float16*)(from + (size_t)(j)*stride))
+static ALWAYS_INLINE void make_strip(float16* to, __global const float* from, int stride, int chunks,
+                                     float8 weight) {
+  for (int c = 0; c < chunks; ++c, from += 16) {
+    float16 across = (float16)(weight.s1) * COLUMN(1);
+    across = fma((float16)(weight.s0), COLUMN(0), across);
+    across = fma((float16)(weight.s2), COLUMN(2), across);
+    across = fma((float16)(weight.s3), COLUMN(3), across);
+    across = fma((float16)(weight.s4), COLUMN(4), across);
+    to[c] = fma((float16)(weight.s5), COLUMN(5), across);
+  }
+}
+
+// Heights follow one another `slope` rows apart, from `lowest` rows beyond row `whole` of the strip on. In
+// floats about the middle of eight.
+static ALWAYS_INLINE void place_heights(Seen* seen, double lowest, double slope, int whole, int last) {
+  const double4 middle = fma((double4)(slope), (double4)(3.5, 11.5, 19.5, 27.5), (double4)(lowest));
+  const int4 cuts = convert_int4(middle);
+  const float4 parts = convert_float4(middle - convert_double4(cuts));
+  int cut[GROUPS];
+  float part[GROUPS];
+  vstore4(cuts + whole, 0, cut);
+  vstore4(parts, 0, part);
+  const float8 from_middle = TO_VEC(INDEX) - 3.5f;
+  for (int j = 0; j < GROUPS; ++j) {
+    const float8 at = fma((float8)((float)slope), from_middle, (float8)(part[j]));
+    int8 below = convert_int8(at);
+    below += convert_float8(below) > at;  // true is -1
+    vstore8(at - convert_float8(below) - 0.5f, j, seen->g);
+    vstore8(clamp(below + cut[j], (int8)(0), (int8)(last)), j, seen->row);
+  }
+}
+
+// dx, dy, dz: nodes from the tile's middle to the lowest of so many heights.
+static ALWAYS_INLINE void look_at(Seen* seen, __global const float* plane, __global const ConeView* v,
+                                  double dx, double dy, double dz, int heights, int column_stride,
+                                  int last_column, int last_row) {
+  const double inverse = 1.0 / (fma(v->step_lambda[0], dx, v->step_lambda[1] * dy) + v->lambda),
+               u = fma(fma(v->step_u[0], dx, v->step_u[1] * dy), inverse, v->part_u),
+               slope = v->step_v[2] * inverse,
+               lowest =
+                   fma(fma(v->step_v[2], dz, fma(v->step_v[0], dx, v->step_v[1] * dy)), inverse, v->part_v),
+               highest = fma(slope, (double)(heights - 1), lowest);
+  const int whole_u = floor_of(u), whole_v = (int)v->whole_v - 2,
+            column = clamp((int)v->whole_u + whole_u - 2, 0, last_column);
+  // A row more on either side: floats may round to it.
+  const int low = clamp(whole_v + floor_of(min(lowest, highest)) - 1, 0, last_row) / 16 * 16,
+            high = clamp(whole_v + floor_of(max(lowest, highest)) + 1, 0, last_row) + VDVR_CONE_HEIGHTS,
+            chunks = min((high - low + 15) / 16, CHUNKS);
+  make_strip(seen->strip, plane + (size_t)column * column_stride + low, column_stride, chunks,
+             (float)(inverse * inverse) * taps((float)(u - (double)whole_u - 0.5)));
+  place_heights(seen, lowest, slope, whole_v - low, chunks * 16 - VDVR_CONE_HEIGHTS);
+}
+
+#define CLEAR(n) float8 sum##n = (float8)(0.0f);
+#define ADD(n) sum##n = fma(taps(g[n]), vload8(0, strip + row[n]), sum##n);
+#define PUT(n) to[n] += sum_of(sum##n);
+// Adds eight heights of some views.
+static ALWAYS_INLINE void add_heights(float* to, const Seen* seen, int views, int first) {
+  FOR_LANES(CLEAR)
+  for (int i = 0; i < views; ++i) {
+    const float *strip = (const float*)seen[i].strip, *g = seen[i].g + first;
+    const int* row = seen[i].row + first;
+    FOR_LANES(ADD)
+  }
+  FOR_LANES(PUT)
+}
+
+__kernel void cone_runs(__global float* out, __global const float* table, __global const ConeView* views,
+                        __global const int2* wanted, ulong first, VdvrConeNodes s) {
+  const int first_y = (int)get_global_id(0) * VDVR_CONE_ROWS, height = (int)get_global_id(1) * RUN,
+            tile = (int)get_global_id(2), heights = min(s.groups * VDVR_CONE_HEIGHTS - height, RUN);
+  if (first_y >= VDVR_CONE_TILE || heights <= 0 || tile >= s.tiles) return;
+  const double half_side = 0.5 * (double)(VDVR_CONE_TILE - 1),
+               dz = (double)height - 0.5 * (double)(s.groups * VDVR_CONE_HEIGHTS - 1);
+  __global const ConeView* of_tile = views + (size_t)tile * s.views;
+  __global const int2* ranges = wanted + tile * VDVR_CONE_TILE + first_y;
+  float sums[VDVR_CONE_ROWS * VDVR_CONE_TILE * RUN];
+  for (int i = 0; i < VDVR_CONE_ROWS * VDVR_CONE_TILE * RUN / 16; ++i) vstore16((float16)(0.0f), i, sums);
+  Seen seen[TOGETHER];
+  for (int k = 0; k < s.views; k += TOGETHER) {
+    const int together = min(TOGETHER, s.views - k);
+    for (int y = 0; y < VDVR_CONE_ROWS; ++y)
+      for (int x = ranges[y].x; x <= ranges[y].y; ++x) {
+        for (int i = 0; i < together; ++i)
+          look_at(seen + i, table + (size_t)(k + i) * s.plane, of_tile + k + i, (double)x - half_side,
+                  (double)(first_y + y) - half_side, dz, heights, s.column_stride, s.last_column, s.last_row);
+        float* to = sums + (y * VDVR_CONE_TILE + x) * RUN;
+        for (int j = 0; j < heights; j += VDVR_LANES) add_heights(to + j, seen, together, j);
+      }
+  }
+  __global float* to = out + first + (size_t)tile * s.tile + height;
+  for (int y = 0; y < VDVR_CONE_ROWS; ++y)
+    for (int x = ranges[y].x; x <= ranges[y].y; ++x) {
+      __global float* column = to + ((size_t)(first_y + y) * VDVR_CONE_TILE + x) * s.stride;
+      const float* from = sums + (y * VDVR_CONE_TILE + x) * RUN;
+      for (int j = 0; j < heights / VDVR_LANES; ++j) vstore8(vload8(j, column) + vload8(j, from), j, column);
+    }
+}

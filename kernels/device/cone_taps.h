@@ -1,0 +1,44 @@
+// What both forms of the kept nodes of cone beam share: a view as the host gives it, and six taps of a place.
+#ifndef VDVR_CONE_TAPS_H
+#define VDVR_CONE_TAPS_H
+#include "device/lanes.h"
+#include "shared/six_taps.h"
+
+// As host/certify/kept/cone_tiles.cpp fills it.
+typedef struct {
+  REAL step_u[3], part_u;
+  REAL step_v[3], part_v;
+  REAL step_lambda[3], lambda;
+  REAL whole_u, whole_v, unused[2];
+} ConeView;
+
+// Of taps -2 .. 3, and two that read what is not used.
+#define LANES(a, b, c, d, e, f) (float8)(a, b, c, d, e, f, 0.0f, 0.0f)
+#define FIRST_OF(a, b, c) a
+#define SECOND_OF(a, b, c) b
+#define THIRD_OF(a, b, c) c
+// A list becomes arguments where it is handed on: OpenCL C has no macros of any number of them.
+#define TAKE(pick, list) pick(list)
+#define TAP(pick, kind, tap) TAKE(pick, VDVR_SIX_##kind##_##tap)
+#define COEFFICIENTS(pick, kind, sign)                                                        \
+  LANES(TAP(pick, kind, A), TAP(pick, kind, B), TAP(pick, kind, C), sign(TAP(pick, kind, C)), \
+        sign(TAP(pick, kind, B)), sign(TAP(pick, kind, A)))
+#define SAME(x) (x)
+#define OPPOSITE(x) (-(x))
+#define EVEN_OF(pick) COEFFICIENTS(pick, EVEN, SAME)
+#define ODD_OF(pick) COEFFICIENTS(pick, ODD, OPPOSITE)
+
+static inline __attribute__((always_inline)) float8 taps(float g) {
+  const float s = g * g;
+  return fma((float8)(g),
+             VDVR_SIX_FUSED_HORNER(float8, s, ODD_OF(FIRST_OF), ODD_OF(SECOND_OF), ODD_OF(THIRD_OF)),
+             VDVR_SIX_FUSED_HORNER(float8, s, EVEN_OF(FIRST_OF), EVEN_OF(SECOND_OF), EVEN_OF(THIRD_OF)));
+}
+
+static inline __attribute__((always_inline)) float sum_of(float8 v) {
+  const float4 four = v.lo + v.hi;
+  const float2 two = four.lo + four.hi;
+  return two.x + two.y;
+}
+
+#endif
