@@ -34,10 +34,10 @@ class GoldRates {
   [[nodiscard]] double projection() const { return largest(&GoldStream::projection); }
 
  private:
-  [[nodiscard]] double largest(double (GoldStream::*of)() const) const {
+  [[nodiscard]] double largest(double (GoldStream::*term)() const) const {
     double out = 0;
     for (const auto* gold : {&fine_, &coarse_, &finer_})
-      if (*gold) out = std::max(out, ((**gold).*of)());
+      if (*gold) out = std::max(out, ((**gold).*term)());
     return out;
   }
   std::optional<GoldStream> fine_, coarse_, finer_;
