@@ -164,7 +164,9 @@ void compare_worst(Compare& out, const MixedVolume& v, const Certificate& c, flo
     // Nodes are 1/64 of a cell apart at the least.
     if (!(cell >= -0x1p-10 && cell <= static_cast<double>(v.grid.cells[a]) + 0x1p-10))
       return out.differs(fmt::format("worst_at is ({}), outside the grid", fmt::join(c.worst_at, ", ")));
-    if (!(std::abs(cell * v.rate - std::round(cell * v.rate)) <= 0x1p-10))
+    // Gold of the plan's rate, or of the finer one that decides what it leaves.
+    const double node = 2 * cell * v.rate;
+    if (!(std::abs(node - std::round(node)) <= 0x1p-10))
       return out.differs(fmt::format("worst_at is ({}), at no gold node", fmt::join(c.worst_at, ", ")));
     const auto brick = [&](double at_cell) {
       return std::clamp<std::int64_t>(static_cast<std::int64_t>(std::floor(at_cell / v.granularity)), 0,
