@@ -232,9 +232,11 @@ std::uint64_t PagedVolume::memory_bytes() const { return impl_->memory; }
 std::pair<float, float> PagedVolume::value_range() const { return impl_->facts->value_range; }
 
 bool fits(const Device& device, const MixedVolume& volume) {
+  // The probe's tile, and pieces of rays of a band of pixels.
+  constexpr std::uint64_t beside = std::uint64_t{8} << 20;
   const std::uint64_t samples = sample_buffer_bytes(volume), left = device.memory_left();
   return samples <= device.info().max_allocation &&
-         samples + kDeviceBytesPerBrick * volume.level.size() <= left;
+         samples + kDeviceBytesPerBrick * volume.level.size() + beside <= left;
 }
 
 }  // namespace vdvr

@@ -170,9 +170,10 @@ void PictureParts::refuse(const Plan& plan) const {
   std::string enough;
   const std::uint64_t limit = volume_.asked > 0 ? volume_.asked : volume_.state->memory.limit();
   if (limit > 0 && plan.most > limit_) {
-    // Of what the limit grows by, an eighth may go to scratch, and an eighth of the rest is left aside.
+    // Of what the limit grows by, an eighth may go to scratch, and an eighth of the rest is left aside. What
+    // comes after this was asked, the probe's tile above all, takes up to a MiB.
     const std::uint64_t least = limit + (plan.lacking / 49 + 1) * 64;
-    enough = fmt::format("; a limit of {}M a device would do", (least >> 20) + 1);
+    enough = fmt::format("; a limit of {}M a device would do", (least >> 20) + 2);
   }
   throw ResourceError(
       fmt::format("the bricks behind {0} x {0} pixels take up to {1} bytes with base and index, and {2} are "

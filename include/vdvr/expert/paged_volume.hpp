@@ -48,7 +48,7 @@ class VDVR_API PagedVolume {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Whether a device has room for all of a volume (ResidentVolume), half of which pictures may need beside.
+/// Whether a device has room for all of a volume (ResidentVolume), and for what pictures need beside.
 VDVR_API bool fits(const Device& device, const MixedVolume& volume);
 
 }  // namespace vdvr

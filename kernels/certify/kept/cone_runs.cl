@@ -48,7 +48,7 @@ static ALWAYS_INLINE void make_strip(float16* to, __global const float* from, in
 // Heights follow one another `slope` rows apart, from `lowest` rows beyond row `whole` of the strip on. In
 // floats about the middle of eight.
 static ALWAYS_INLINE void place_heights(Seen* seen, double lowest, double slope, int whole, int last) {
-  const double4 middle = fma((double4)(slope), (double4)(3.5, 11.5, 19.5, 27.5), (double4)(lowest));
+  const double4 middle = fma((double4)(slope), (double4)(3.5f, 11.5f, 19.5f, 27.5f), (double4)(lowest));
   const int4 cuts = convert_int4(middle);
   const float4 parts = convert_float4(middle - convert_double4(cuts));
   int cut[GROUPS];
@@ -69,7 +69,7 @@ static ALWAYS_INLINE void place_heights(Seen* seen, double lowest, double slope,
 static ALWAYS_INLINE void look_at(Seen* seen, __global const float* plane, __global const ConeView* v,
                                   double dx, double dy, double dz, int heights, int column_stride,
                                   int last_column, int last_row) {
-  const double inverse = 1.0 / (fma(v->step_lambda[0], dx, v->step_lambda[1] * dy) + v->lambda),
+  const double inverse = 1.0f / (fma(v->step_lambda[0], dx, v->step_lambda[1] * dy) + v->lambda),
                u = fma(fma(v->step_u[0], dx, v->step_u[1] * dy), inverse, v->part_u),
                slope = v->step_v[2] * inverse,
                lowest =
@@ -82,7 +82,7 @@ static ALWAYS_INLINE void look_at(Seen* seen, __global const float* plane, __glo
             high = clamp(whole_v + floor_of(max(lowest, highest)) + 1, 0, last_row) + VDVR_CONE_HEIGHTS,
             chunks = min((high - low + 15) / 16, CHUNKS);
   make_strip(seen->strip, plane + (size_t)column * column_stride + low, column_stride, chunks,
-             (float)(inverse * inverse) * taps((float)(u - (double)whole_u - 0.5)));
+             (float)(inverse * inverse) * taps((float)(u - (double)whole_u - 0.5f)));
   place_heights(seen, lowest, slope, whole_v - low, chunks * 16 - VDVR_CONE_HEIGHTS);
 }
 
@@ -105,8 +105,8 @@ __kernel void cone_runs(__global float* out, __global const float* table, __glob
   const int first_y = (int)get_global_id(0) * VDVR_CONE_ROWS, height = (int)get_global_id(1) * RUN,
             tile = (int)get_global_id(2), heights = min(s.groups * VDVR_CONE_HEIGHTS - height, RUN);
   if (first_y >= VDVR_CONE_TILE || heights <= 0 || tile >= s.tiles) return;
-  const double half_side = 0.5 * (double)(VDVR_CONE_TILE - 1),
-               dz = (double)height - 0.5 * (double)(s.groups * VDVR_CONE_HEIGHTS - 1);
+  const double half_side = 0.5f * (double)(VDVR_CONE_TILE - 1),
+               dz = (double)height - 0.5f * (double)(s.groups * VDVR_CONE_HEIGHTS - 1);
   __global const ConeView* of_tile = views + (size_t)tile * s.views;
   __global const int2* ranges = wanted + tile * VDVR_CONE_TILE + first_y;
   float sums[VDVR_CONE_ROWS * VDVR_CONE_TILE * RUN];
