@@ -6,6 +6,8 @@
 // Nodes of a tile's side, and heights that are computed together.
 #define VDVR_CONE_TILE 32
 #define VDVR_CONE_HEIGHTS 8
+// Views that are added up together, then to the others.
+#define VDVR_CONE_VIEWS 4
 // Of cone_runs.cl: heights of a work-item, rows of a tile alike, and floats of a strip.
 #define VDVR_CONE_RUN 32
 #define VDVR_CONE_ROWS 16

@@ -2,12 +2,11 @@
 // tables of eight values a pixel (docs/error-bounds.md, section 16). Layouts: float table[view][column][row];
 // ConeView views[tile][block][view]; int2 wanted[tile][y]: first and last column of nodes. Places are in
 // columns and rows of the table, relative to the middle of a block of nodes. Neighbours in y, which read the
-// same columns and rows, follow one another. Called by host/certify/kept/cone_tiles.cpp.
+// same columns and rows, follow one another. Of upright detectors, in double precision, values are those of
+// cone_runs.cl to the bit. Called by host/certify/kept/cone_tiles.cpp.
+#include "device/cone_taps.h"
 #include "device/lanes.h"
 #include "shared/cone_nodes.h"
-#include "shared/six_taps.h"
-
-#include "device/cone_taps.h"
 
 #define COLUMN(j) vload8(0, from + (size_t)(j)*column_stride)
 // What a view adds at one height: six columns of eight rows, by weights along u, then along v.
@@ -27,14 +26,19 @@
 #if VDVR_LANES > 8
 #error "each height has eight sums: eight lanes at most"
 #endif
+#define BEGIN(n) float total##n = 0.0f;
 #define CLEAR(n) float8 sum##n = (float8)(0.0f);
+#define FOLD(n) total##n += sum_of(sum##n);
 #define UPRIGHT_PART(n) ADD(n, column, weight_u, LANE(row, n), LANE(g_v, n))
 #define TILTED_PART(n)                                                                         \
   {                                                                                            \
     const float8 weight_u = (float)(LANE(inverse, n) * LANE(inverse, n)) * taps(LANE(g_u, n)); \
     ADD(n, LANE(column, n), weight_u, LANE(row, n), LANE(g_v, n))                              \
   }
-#define PUT(n) to[n] += sum_of(sum##n);
+#define PUT(n) to[n] += total##n;
+
+// Heights of eight as floats about their middle.
+#define IN_RUNS (VDVR_UPRIGHT && VDVR_DOUBLE)
 
 __kernel void cone_nodes(__global float* out, __global const float* table, __global const ConeView* views,
                          __global const int2* wanted, ulong first, VdvrConeNodes s) {
@@ -47,7 +51,14 @@ __kernel void cone_nodes(__global float* out, __global const float* table, __glo
   const float half_side = 0.5f * (float)(s.block_side - 1),
               half_height = 0.5f * (float)(s.block_groups * VDVR_CONE_HEIGHTS - 1);
   const REAL dy = (REAL)((float)(y - block_y * s.block_side) - half_side);
+#if IN_RUNS
+  const int run = height / VDVR_CONE_RUN * VDVR_CONE_RUN,
+            eight = height / VDVR_CONE_HEIGHTS * VDVR_CONE_HEIGHTS;
+  const double dz = (double)((float)run - half_height), to_middle = (double)((float)(eight - run) + 3.5f);
+  const VEC from_middle = TO_VEC(height - eight + INDEX) - 3.5f;
+#else
   const SUM dz = WIDE(TO_VEC(height - block_z * s.block_groups * VDVR_CONE_HEIGHTS + INDEX) - half_height);
+#endif
   for (int x = range.x; x <= range.y; ++x) {
     const int block_x = x / s.block_side;
     const REAL dx = (REAL)((float)(x - block_x * s.block_side) - half_side);
@@ -56,32 +67,45 @@ __kernel void cone_nodes(__global float* out, __global const float* table, __glo
                  block_x) *
                     views_all;
     __global const float* plane = table;
-    FOR_LANES(CLEAR)
-    for (int k = 0; k < views_all; ++k, ++v, plane += s.plane) {
-      const REAL l_plane = fma(v->step_lambda[0], dx, v->step_lambda[1] * dy) + v->lambda,
-                 u_plane = fma(v->step_u[0], dx, v->step_u[1] * dy),
-                 v_plane = fma(v->step_v[0], dx, v->step_v[1] * dy);
+    FOR_LANES(BEGIN)
+    for (int first_view = 0; first_view < views_all; first_view += VDVR_CONE_VIEWS) {
+      FOR_LANES(CLEAR)
+      for (int k = first_view; k < min(first_view + VDVR_CONE_VIEWS, views_all); ++k, ++v, plane += s.plane) {
+        const REAL l_plane = fma(v->step_lambda[0], dx, v->step_lambda[1] * dy) + v->lambda,
+                   u_plane = fma(v->step_u[0], dx, v->step_u[1] * dy),
+                   v_plane = fma(v->step_v[0], dx, v->step_v[1] * dy);
 #if VDVR_UPRIGHT
-      const REAL inverse = (REAL)1 / l_plane, u = fma(u_plane, inverse, v->part_u), whole_u = floor(u);
-      const int column = (int)v->whole_u + (int)whole_u - 2;
-      const float8 weight_u = (float)(inverse * inverse) * taps((float)(u - whole_u - 0.5f));
-      const SUM v8 = fma(fma((SUM)(v->step_v[2]), dz, (SUM)(v_plane)), (SUM)(inverse), (SUM)(v->part_v));
+        const REAL inverse = (REAL)1 / l_plane, u = fma(u_plane, inverse, v->part_u), whole_u = floor(u);
+        const int column = (int)v->whole_u + (int)whole_u - 2;
+        const float8 weight_u = (float)(inverse * inverse) * taps((float)(u - whole_u - 0.5f));
 #else
-      const SUM inverse = (REAL)1 / fma((SUM)(v->step_lambda[2]), dz, (SUM)(l_plane)),
-                u8 = fma(fma((SUM)(v->step_u[2]), dz, (SUM)(u_plane)), inverse, (SUM)(v->part_u)),
-                whole_u = floor(u8),
-                v8 = fma(fma((SUM)(v->step_v[2]), dz, (SUM)(v_plane)), inverse, (SUM)(v->part_v));
-      const INT column = (int)v->whole_u + TO_INT(whole_u) - 2;
-      const VEC g_u = NARROW(u8 - whole_u - 0.5f);
+        const SUM inverse = (REAL)1 / fma((SUM)(v->step_lambda[2]), dz, (SUM)(l_plane)),
+                  u8 = fma(fma((SUM)(v->step_u[2]), dz, (SUM)(u_plane)), inverse, (SUM)(v->part_u)),
+                  whole_u = floor(u8);
+        const INT column = (int)v->whole_u + TO_INT(whole_u) - 2;
+        const VEC g_u = NARROW(u8 - whole_u - 0.5f);
 #endif
-      const SUM whole_v = floor(v8);
-      const INT row = (int)v->whole_v + TO_INT(whole_v) - 2;
-      const VEC g_v = NARROW(v8 - whole_v - 0.5f);
+#if IN_RUNS
+        const double slope = v->step_v[2] * inverse,
+                     lowest = fma(fma(v->step_v[2], dz, v_plane), inverse, v->part_v),
+                     middle = fma(slope, to_middle, lowest);
+        const int cut = (int)middle;
+        const VEC place = fma((VEC)((float)slope), from_middle, (VEC)((float)(middle - (double)cut))),
+                  below = floor(place), g_v = place - below - 0.5f;
+        const INT row = (int)v->whole_v + cut + TO_INT(below) - 2;
+#else
+        const SUM v8 = fma(fma((SUM)(v->step_v[2]), dz, (SUM)(v_plane)), (SUM)(inverse), (SUM)(v->part_v)),
+                  whole_v = floor(v8);
+        const INT row = (int)v->whole_v + TO_INT(whole_v) - 2;
+        const VEC g_v = NARROW(v8 - whole_v - 0.5f);
+#endif
 #if VDVR_UPRIGHT
-      FOR_LANES(UPRIGHT_PART)
+        FOR_LANES(UPRIGHT_PART)
 #else
-      FOR_LANES(TILTED_PART)
+        FOR_LANES(TILTED_PART)
 #endif
+      }
+      FOR_LANES(FOLD)
     }
     __global float* to =
         out + first + (size_t)tile * s.tile + ((size_t)y * VDVR_CONE_TILE + x) * s.stride + height;

@@ -1,8 +1,9 @@
 // Kept nodes of cone beam where all detectors stand upright: u, lambda and the weights of six columns belong
 // to a whole column of nodes. They are applied once to the rows that a run of heights reads, which gives a
 // strip, and each height takes six rows of it (docs/error-bounds.md, section 16). Layouts and what is added
-// are those of cone_nodes.cl. A work-item does a run of heights of some rows of a tile, some views at a time:
-// what they read stays in caches. In double precision only. Called by host/certify/kept/cone_tiles.cpp.
+// are those of cone_nodes.cl, to the bit. A work-item does a run of heights of some rows of a tile, some
+// views at a time: what they read stays in caches. In double precision only. Called by
+// host/certify/kept/cone_tiles.cpp.
 #define VDVR_LANES 8
 #define VDVR_DOUBLE 1
 #include "device/cone_taps.h"
@@ -15,7 +16,7 @@
 #error "the middles of a run's groups of heights are a vector of four"
 #endif
 // Views whose strips are made together, and vectors of a strip.
-#define TOGETHER 4
+#define TOGETHER VDVR_CONE_VIEWS
 #define CHUNKS (VDVR_CONE_STRIP / 16)
 
 // What a column of nodes reads of a view: strip, and by height the first of six rows, and the place g
@@ -83,7 +84,7 @@ static ALWAYS_INLINE void look_at(Seen* seen, __global const float* plane, __glo
             chunks = min((high - low + 15) / 16, CHUNKS);
   make_strip(seen->strip, plane + (size_t)column * column_stride + low, column_stride, chunks,
              (float)(inverse * inverse) * taps((float)(u - (double)whole_u - 0.5f)));
-  place_heights(seen, lowest, slope, whole_v - low, chunks * 16 - VDVR_CONE_HEIGHTS);
+  place_heights(seen, lowest, slope, whole_v - low, min(chunks * 16 - VDVR_CONE_HEIGHTS, last_row - low));
 }
 
 #define CLEAR(n) float8 sum##n = (float8)(0.0f);
