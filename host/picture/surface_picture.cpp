@@ -5,8 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "host/picture/figure.hpp"
-
 namespace vdvr {
 namespace {
 
@@ -17,6 +15,26 @@ constexpr Colour kNone{24, 24, 28}, kSure{225, 222, 205}, kStripe{235, 110, 20},
 
 void put(Image& image, std::size_t pixel, const Colour& colour) {
   std::copy(colour.begin(), colour.end(), image.rgb.begin() + static_cast<std::ptrdiff_t>(pixel * 3));
+}
+
+/// Dark to light, evenly in perceived lightness: matplotlib's viridis at nine stops.
+Colour viridis(double fraction) {
+  static constexpr std::array<std::array<double, 3>, 9> stops{{{68, 1, 84},
+                                                               {71, 44, 122},
+                                                               {59, 81, 139},
+                                                               {44, 113, 142},
+                                                               {33, 144, 141},
+                                                               {39, 173, 129},
+                                                               {92, 200, 99},
+                                                               {170, 220, 50},
+                                                               {253, 231, 37}}};
+  const double x = std::clamp(fraction, 0.0, 1.0) * (stops.size() - 1);
+  const auto i = std::min<std::size_t>(stops.size() - 2, static_cast<std::size_t>(x));
+  const double t = x - static_cast<double>(i);
+  Colour c{};
+  for (std::size_t k = 0; k < 3; ++k)
+    c[k] = static_cast<std::uint8_t>(std::lround((1 - t) * stops[i][k] + t * stops[i + 1][k]));
+  return c;
 }
 
 // Of stripes that run to the upper right.
@@ -61,9 +79,7 @@ FloatImage band_of(const SurfaceBounds& b) {
 Image band_picture(const SurfaceBounds& b, double scale) {
   const FloatImage band = band_of(b);
   return drawn(b, [&](std::size_t i) {
-    return b.hit[i] == sure
-               ? figure::colour(std::clamp(static_cast<double>(band.values[i]) / scale, 0.0, 1.0))
-               : kNone;
+    return b.hit[i] == sure ? viridis(static_cast<double>(band.values[i]) / scale) : kNone;
   });
 }
 

@@ -109,40 +109,6 @@ BOOST_AUTO_TEST_CASE(probe_answers_every_point_in_order) {
   check_refused({"probe", scan, "--points", at("p.csv"), "-o", at("bad-out.csv")}, "--exact");
 }
 
-BOOST_AUTO_TEST_CASE(plan_draws_pictures_and_overwrites_none_without_force) {
-  const fs::path output = at("plan-pictures");
-  const std::vector<std::string> words{"plan",       small_scan(),    "--epsilon", "20%",
-                                       "--pictures", output.string(), "--json"};
-  const Ended r = run(words);
-  BOOST_TEST_CONTEXT(r.err) { BOOST_REQUIRE(r.code == 0); }
-  const auto json = nlohmann::json::parse(r.out, nullptr, false);
-  BOOST_REQUIRE(json.is_object());
-  BOOST_TEST(json["pictures"]["files"].size() == 7u);
-  for (const auto& [name, shows] : json["pictures"]["files"].items())
-    BOOST_TEST(bytes_of(output / name).substr(1, 3) == "PNG", name);
-  const auto numbers = nlohmann::json::parse(bytes_of(output / "pictures.json"), nullptr, false);
-  BOOST_REQUIRE(numbers.is_object());
-  for (const std::string spectrum : {"row", "projection", "volume"}) {
-    double before = std::numeric_limits<double>::infinity();
-    for (const auto& sum : numbers[spectrum]["sums"]) {
-      const double bound = sum["amplitude_bound"].get<double>();
-      BOOST_TEST(bound > 0);
-      BOOST_TEST(bound < before);
-      BOOST_TEST(bound >= sum["with_closed_form"].get<double>());
-      before = bound;
-    }
-  }
-
-  write(output / "row.png", "kept");
-  check_refused(words, "--force");
-  BOOST_TEST(bytes_of(output / "row.png") == "kept");
-  std::vector<std::string> forced = words;
-  forced.emplace_back("--force");
-  BOOST_TEST(run(forced).code == 0);
-  BOOST_TEST(bytes_of(output / "row.png").substr(1, 3) == "PNG");
-  check_refused({"plan", small_scan(), "--epsilon", "20%", "--pictures", small_scan()}, "not a folder");
-}
-
 // plan, build, verify and probe of a part of the default grid.
 BOOST_AUTO_TEST_CASE(a_region_of_interest_without_a_size_is_all_that_is_planned_and_built) {
   const std::string file = at("region.vdvr"), box = "--roi=-3,-2,-1,2,3,1";

@@ -1,5 +1,4 @@
-// vdvr plan: bounds, rates, shares, storage, memory and time foreseen, and pictures of what interpolation
-// does to the scan's frequencies; builds nothing.
+// vdvr plan: bounds, rates, shares, storage, memory and time foreseen; builds nothing.
 #include "vdvr/expert/plan.hpp"
 
 #include <fmt/format.h>
@@ -15,8 +14,6 @@
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/picture_forecast.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/expert/output_file.hpp"
-#include "vdvr/expert/plan_pictures.hpp"
 
 namespace vdvr::cli {
 namespace {
@@ -138,39 +135,10 @@ void print_plan(const Planned& p, const std::optional<PictureForecast>& forecast
   print_notes(plan.notes);
 }
 
-/// Every file that will be written; pictures.json comes last and says that the folder is complete.
-std::vector<std::string> picture_names() {
-  return {"row.png",
-          "projection-spectrum.png",
-          "projection-map.png",
-          "projection-product.png",
-          "volume-spectrum.png",
-          "volume-map.png",
-          "volume-product.png",
-          "pictures.json"};
-}
-
-/// Draws and writes them; the content of pictures.json.
-Json write_pictures(Device& device, OutputFolder& folder, const Planned& p, const Progress& progress) {
-  const PlanPictures made = plan_pictures(device, p.scan, p.made.plan, progress);
-  folder.begin();
-  for (const auto& picture : made.pictures) write_png(folder.file(picture.file), picture.image);
-  Json json = Json::parse(made.json);
-  io::write_file(folder.file("pictures.json"), json.dump(2) + "\n");
-  return json;
-}
-
-void print_pictures(const Json& pictures) {
-  fmt::print("pictures in    {}\n", pictures["folder"].get<std::string>());
-  for (const auto& [name, shows] : pictures["files"].items())
-    fmt::print("    {:<24} {}\n", name, shows.get<std::string>());
-}
-
 }  // namespace
 
 int plan_command(Arguments& args) {
   args.positional("IN", "projections")
-      .value("pictures", "DIR", "pictures of spectra, error maps and their products")
       .flag("compare-filters",
             "also what each ramp filter stores at the same tolerance, and the noise it leaves")
       .value("ranks", "N", "also what N ranks of vdvr-mpi would take, each with a device as this one")
@@ -190,14 +158,7 @@ int plan_command(Arguments& args) {
     refuse(args, {"filter"}, "excludes --compare-filters, which has all of them");
   if (!args.has("ranks")) refuse(args, {"machines"}, "give --ranks with it");
   Wanted wanted = wanted_of(args);
-  // Pictures show the whole volume.
-  wanted.options.plan.estimate = !args.has("pictures");
-  std::optional<OutputFolder> folder;
-  if (args.has("pictures")) {
-    kind_of(args.path("IN"), args);
-    folder.emplace(args.path("pictures"), picture_names(), common.force);
-  }
-
+  wanted.options.plan.estimate = true;
   Device device = open_device(common);
   ProgressLine progress(args.who(), common.quiet);
   const Planned planned = read_and_plan(device, args, wanted, progress.callback());
@@ -211,23 +172,17 @@ int plan_command(Arguments& args) {
                     planned.noise.why));
   const std::optional<FieldNoise> noise =
       noise_of_plan(device, planned, args.has("compare-filters") ? &wanted : nullptr, progress.callback());
-  Json json = plan_json(planned, forecast), pictures;
+  Json json = plan_json(planned, forecast);
   json["noise"] = noise_json(found);
   if (noise) json["noise"]["field"] = field_noise_json(*noise, planned.made.plan);
   const std::optional<Spread> spread = spread_of(args, planned);
   if (spread) json["foreseen"]["spread"] = spread_json(*spread);
-  if (folder) {
-    pictures = write_pictures(device, *folder, planned, progress.callback());
-    pictures["folder"] = args.path("pictures").string();
-    json["pictures"] = pictures;
-  }
   progress.clear();
   print_result(common, json, [&] {
     print_plan(planned, forecast);
     print_noise(found);
     if (noise) print_field_noise(*noise, planned.made.plan);
     if (spread) print_spread(*spread);
-    if (folder) print_pictures(pictures);
   });
   return 0;
 }
