@@ -177,8 +177,11 @@ bool Arguments::parse() {
   all.add(hidden_);
   // No guessing: an abbreviation that works today would change its meaning with the next option.
   const int style = po::command_line_style::unix_style & ~po::command_line_style::allow_guessing;
-  if (std::any_of(tokens_.begin(), tokens_.end(), [](const auto& t) { return t == "--help" || t == "-h"; })) {
-    print_help();
+  const auto given = [this](const char* word) {
+    return std::find(tokens_.begin(), tokens_.end(), word) != tokens_.end();
+  };
+  if (given("--help-all") || given("--help") || given("-h")) {
+    print_help(given("--help-all"));
     return false;
   }
   try {
@@ -194,16 +197,35 @@ bool Arguments::parse() {
   return true;
 }
 
-void Arguments::print_help() const {
+po::options_description Arguments::main_options() const {
+  po::options_description chosen("Options", 110, 70);
+  for (const auto& name : command_.main_options)
+    for (const auto& g : groups_)
+      for (const auto& o : g.options())
+        if (o->long_name() == name) chosen.add(o);
+  return chosen;
+}
+
+void Arguments::print_help(bool all) const {
+  const auto print_group = [](const po::options_description& group) {
+    std::ostringstream text;
+    text << group;
+    fmt::print("\n{}", text.str());
+  };
   fmt::print("{}\n\n{}\n", usage(), command_.purpose);
   if (!positional_help_.empty()) fmt::print("\n");
   for (const auto& [positional, help] : positional_help_) fmt::print("  {:<10} {}\n", positional, help);
-  for (const auto& g : groups_) {
-    if (g.options().empty()) continue;
-    std::ostringstream text;
-    text << g;
-    fmt::print("\n{}", text.str());
-  }
+  std::size_t options = 0;
+  for (const auto& g : groups_) options += g.options().size();
+  const po::options_description chosen = main_options();
+  const bool some = !all && !chosen.options().empty();
+  if (some) print_group(chosen);
+  for (const auto& g : groups_)
+    if (!some && !g.options().empty()) print_group(g);
+  if (!command_.examples.empty()) fmt::print("\nExamples:\n");
+  for (const auto& [line, effect] : command_.examples) fmt::print("  {}\n      {}\n", line, effect);
+  if (some)
+    fmt::print("\n{} more options, by topic: {} --help-all\n", options - chosen.options().size(), name());
 }
 
 bool Arguments::has(const std::string& name) const { return values_.count(name) != 0; }

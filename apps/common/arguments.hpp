@@ -37,7 +37,7 @@ class Arguments {
   /// The next stray word; all positionals are required.
   Arguments& positional(const std::string& name, const std::string& help);
 
-  /// False when --help was asked for and printed. Throws InputError for what does not parse.
+  /// False when --help or --help-all was asked for and printed. Throws InputError for what does not parse.
   [[nodiscard]] bool parse();
 
   [[nodiscard]] std::string who() const { return command_.who(); }
@@ -77,7 +77,9 @@ class Arguments {
                                    const std::string& fallback) const;
 
  private:
-  void print_help() const;
+  void print_help(bool all) const;
+  /// Those options that --help explains; none where it explains all.
+  [[nodiscard]] boost::program_options::options_description main_options() const;
   [[nodiscard]] OptionTable table() const;
   /// "vdvr build"; "vdvr bench tune" once the case was taken.
   [[nodiscard]] std::string name() const;

@@ -8,6 +8,12 @@ namespace vdvr::cli {
 
 class Arguments;
 
+/// A line that a user may type, and what comes of it.
+struct Example {
+  const char* line;
+  const char* effect;
+};
+
 struct Command {
   const char* name;     ///< "build"; empty for a program that does one thing
   const char* usage;    ///< what follows the name on the usage line
@@ -15,6 +21,9 @@ struct Command {
   int (*run)(Arguments& args);
   const char* program = "vdvr";
   std::vector<std::string> cases = {};  ///< words of which one comes first, each with options of its own
+  /// Options that --help explains, at most ten; where none is named, all. The others are for --help-all.
+  std::vector<std::string> main_options = {};
+  std::vector<Example> examples = {};
 
   /// "vdvr build": what stands before messages.
   [[nodiscard]] std::string who() const { return std::string(program) + (*name ? " " : "") + name; }

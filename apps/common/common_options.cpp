@@ -20,7 +20,8 @@ void add_common(Arguments& args) {
       .flag("json", "one JSON object on standard output, nothing else")
       .flag("quiet", "no progress and no summary")
       .flag("force", "overwrite existing outputs")
-      .flag("help,h", "this text");
+      .flag("help,h", "the options that most need, and examples")
+      .flag("help-all", "all options, by topic");
 }
 
 void add_untrusted(Arguments& args) {

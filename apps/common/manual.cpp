@@ -87,6 +87,13 @@ std::string options_text(const OptionTable& table, bool with_titles) {
   return text;
 }
 
+std::string examples_text(const std::vector<Example>& examples) {
+  std::string text = examples.empty() ? "" : ".SH EXAMPLES\n";
+  for (const auto& [line, effect] : examples)
+    text += fmt::format(".TP\n\\fB{}\\fR\n{}\n", plain(line), plain(effect));
+  return text;
+}
+
 constexpr const char* exit_status =
     ".SH EXIT STATUS\n"
     ".TP\n0\ndone\n"
@@ -145,6 +152,7 @@ std::string command_page(const Command& command) {
   for (std::size_t i = 0; i < cases.size(); ++i)
     text +=
         fmt::format(".SH {}\n", plain(capitals(command.cases[i]))) + options_text(cases[i], /*titles*/ true);
+  text += examples_text(command.examples);
   text += exit_status;
   if (!whole_program) text += fmt::format(".SH SEE ALSO\n\\fB{}\\fR(1)\n", command.program);
   return text;

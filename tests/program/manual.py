@@ -1,4 +1,5 @@
-"""Man pages and bash completion against --help, which the same tables print: nothing may be missing from either.
+"""Man pages and bash completion against --help-all, which the same tables print: nothing may be missing from either.
+--help tells of ten options at most. Examples hold options that are there, and man pages have them.
 
 manual.py VDVR VDVR_PAPER MANUALS. Where mandoc or lexgrog is installed, every page passes it; bash completes.
 """
@@ -43,14 +44,14 @@ def completed(program, *words):
 commands = re.findall(r"^  ([a-z-]+) ", said(vdvr, "--help").split("commands:\n")[1], re.M)
 expect(len(commands) >= 13, f"--help lists {commands}")
 pages = {"vdvr": said(vdvr, "--man"), "vdvr-paper": said(paper, "--man")}
-cases = {"bench": re.findall(r"(?:Cases: |\| )([a-z]+)", said(vdvr, "bench", "--help"))}
-helps = {"vdvr-paper": [said(paper, "--help")]}
+cases = {"bench": re.findall(r"(?:Cases: |\| )([a-z]+)", said(vdvr, "bench", "--help-all"))}
+helps = {"vdvr-paper": [said(paper, "--help-all")]}
 for command in commands:
     page = f"vdvr-{command}"
     pages[page] = said(vdvr, "--man", command)
     expect(page.replace("-", r"\-") in pages["vdvr"], f"vdvr(1) does not name {page}")
-    helps[page] = ([said(vdvr, command, case, "--help") for case in cases[command]] if command in cases
-                   else [said(vdvr, command, "--help")])
+    helps[page] = ([said(vdvr, command, case, "--help-all") for case in cases[command]] if command in cases
+                   else [said(vdvr, command, "--help-all")])
     expect(command in completed(vdvr, command[:3]), f"{command} is not completed")
     for help_text, case in zip(helps[page], cases.get(command, [None])):
         words = (command, case) if case else (command,)
@@ -62,6 +63,21 @@ for page, texts in helps.items():
         expect(len(options_of(text)) >= 5, f"--help of {page} was not understood")
         for option in options_of(text):
             expect(option.replace("-", r"\-") + r"\fR" in pages[page], f"{page}(1) lacks {option}")
+
+# --help: ten options at most, each as --help-all has it, and examples that the command's options allow.
+for command in commands:
+    shown = said(vdvr, command, "--help")
+    known = {option for text in helps[f"vdvr-{command}"] for option in options_of(text)}
+    named = {option for option in options_of(shown) if option.startswith("--")}
+    expect(0 < len(named) <= 10, f"--help of {command} tells of {len(named)} options")
+    expect(named <= known, f"--help of {command} tells of {named - known}")
+    examples = re.findall(rf"^  (vdvr {command} .*)$", shown, re.M)
+    expect(len(examples) >= 1, f"{command} has no example")
+    for example in examples:
+        for option in re.findall(r" (--?[a-z-]+)", example):
+            expect(option in known, f"example of {command}: {option}")
+        expect(example.replace("-", r"\-") in pages[f"vdvr-{command}"], f"vdvr-{command}(1) lacks {example}")
+
 expect(set(options_of(helps["vdvr-paper"][0])) == set(completed(paper, "-")), "options of vdvr-paper")
 
 # Choices, files, folders; an option's value after '=', which bash makes a word of.

@@ -1,6 +1,8 @@
-// vdvr bench: timings, one JSON line per case on standard output. The result is checked before it is timed.
+// vdvr bench: timings, one JSON line per case on standard output, on a terminal a table. The result is
+// checked before it is timed.
 #include <fmt/format.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -9,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/common/progress.hpp"
+#include "apps/vdvr/bench_table.hpp"
 #include "apps/vdvr/certify.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/output.hpp"
@@ -42,8 +45,10 @@ Json bench_line(const std::string& name, const Device& device, std::size_t repet
           {"repetitions", repetitions}};
 }
 
-void print_line(const Json& json) {
-  fmt::print("{}\n", json.dump());
+/// A table for who looks on, a line of JSON for programs, which read through a pipe.
+void print_line(const CommonOptions& common, const Json& json) {
+  const bool person = !common.json && isatty(STDOUT_FILENO) != 0;
+  fmt::print("{}\n", person ? bench_table(json) : json.dump());
   std::fflush(stdout);
 }
 
@@ -138,7 +143,7 @@ int bench_reconstruction(Arguments& args, const std::string& name, std::optional
   line["gups"] = spread(gups)["median"];  // of the back-projection alone
   line["stages"] = seconds_json(stages);
   line["gups_end_to_end"] = updates / line["seconds"]["median"].get<double>() / 1e9;
-  print_line(line);
+  print_line(common, line);
   return 0;
 }
 
@@ -207,7 +212,7 @@ int bench_build(Arguments& args) {
   line["seconds_over_fbp"] =
       line["seconds"]["median"].get<double>() / line["fbp_seconds"]["median"].get<double>();
   line["storage"] = storage_json(built->volume, 0);
-  print_line(line);
+  print_line(common, line);
   return 0;
 }
 
@@ -302,7 +307,7 @@ int bench_render(Arguments& args) {
   line["samples_per_second"] = spread(samples)["median"];
   // On a CPU that others use, too, this says more than the time on the clock.
   line["processor_seconds"] = processor / static_cast<double>(frames);
-  print_line(line);
+  print_line(common, line);
   return 0;
 }
 
@@ -349,7 +354,7 @@ int bench_bounds(Arguments& args) {
                         {"bound", t.projection_bound},
                         {"ratio", ratio(t.projection_bound, t.projection_error)}};
   line["arithmetic"] = t.arithmetic;
-  print_line(line);
+  print_line(common, line);
   return 0;
 }
 
@@ -395,7 +400,7 @@ int bench_tune(Arguments& args) {
                      {"recorded", recorded},
                      {"candidates", candidates},
                      {"filters", filters}};
-  print_line(line);
+  print_line(common, line);
   return 0;
 }
 
@@ -416,7 +421,8 @@ int bench_command(Arguments& args) {
   args.group(
           "Cases: fbp [--size N --angles K] | fdk [--size N --angles K] | build IN --epsilon E | "
           "render FILE [--frames N] | bounds IN | tune; each has its own --help")
-      .flag("help,h", "this text");
+      .flag("help,h", "this text")
+      .flag("help-all", "the same");
   if (!args.parse()) return 0;
   throw InputError("name a case: fbp, fdk, build, render, bounds or tune");
 }
