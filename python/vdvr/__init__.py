@@ -11,6 +11,7 @@ F is the field that filtered back-projection with ideal interpolation defines, V
 other threads run and end at Ctrl-C. The tutorial: docs/python.md.
 """
 
+from . import _loader  # first: what follows needs it
 from ._core import (
     BuildError,
     CenterEstimate,

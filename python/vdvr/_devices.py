@@ -23,7 +23,7 @@ _REMEDY = (
 )
 
 
-def _use_runtime_of_environment() -> None:
+def use_runtime_of_environment() -> None:
     """Lets the OpenCL loader find Intel's runtime where vdvr[cpu] put it, unless somebody chose drivers.
 
     The loader reads the variable when it is first asked for platforms, which is after this.
@@ -48,7 +48,7 @@ def _use_runtime_of_environment() -> None:
 
 def devices() -> List["_core.DeviceInfo"]:
     """All OpenCL devices, in the order that `device=INDEX` counts them. Empty where no driver is installed."""
-    _use_runtime_of_environment()
+    use_runtime_of_environment()
     return _core.Device.list()
 
 

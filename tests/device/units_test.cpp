@@ -8,7 +8,7 @@
 #include <limits>
 #include <numbers>
 
-#include "host/base/system/round_up.hpp"
+#include "host/base/system/outward.hpp"
 #include "host/volume/sampler/sampler_terms.hpp"
 #include "tests/support/attack_chain.hpp"
 #include "tests/support/scans.hpp"

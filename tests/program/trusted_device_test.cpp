@@ -184,6 +184,21 @@ BOOST_AUTO_TEST_CASE(a_bad_device_is_shown_with_what_failed) {
   BOOST_TEST(shown.out.find("a b + c: ") != std::string::npos, shown.out);
 }
 
+BOOST_AUTO_TEST_CASE(a_good_device_certifies_a_volume_while_it_is_probed_and_a_bad_one_is_not_asked) {
+  const auto shown = [](const Program& program) {
+    const Ended ended = program.run({"devices", "--probe", "--device", "0", "--json"});
+    BOOST_REQUIRE_MESSAGE(ended.code == 0, ended.err);
+    return Json::parse(ended.out);
+  };
+  const TemporaryFolder folder;
+  const Json good = shown(Program(folder.path()));
+  BOOST_TEST(good["devices"][0]["cube"]["holds"].get<bool>(), good.dump());
+  BOOST_TEST(good["devices"][0]["cube"]["found"] == "");
+  BOOST_TEST(!good["setup"]["drivers"].empty());
+  BOOST_TEST(good["setup"]["loader"].get<std::string>().find("OpenCL") != std::string::npos);
+  BOOST_TEST(!shown(Bad(contracts))["devices"][0].contains("cube"));
+}
+
 BOOST_AUTO_TEST_CASE(a_bad_device_draws_when_asked_to_and_certifies_nothing) {
   const Inputs& in = inputs();
   const Bad bad(contracts);

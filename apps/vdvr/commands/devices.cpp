@@ -1,8 +1,11 @@
 // vdvr devices: platforms, devices, limits, which sampler and why.
 #include <fmt/format.h>
+
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "apps/vdvr/command.hpp"
+#include "apps/vdvr/doctor.hpp"
 #include "apps/vdvr/options.hpp"
 #include "apps/vdvr/output.hpp"
 #include "vdvr/error.hpp"
@@ -116,11 +119,13 @@ void print_device(const Json& d) {
     fmt::print(", image3d {:.4g} samples/s", p["image3d_samples_per_second"].get<double>());
   fmt::print("\n");
   for (const char* type : {"f32", "u16", "u8"}) fmt::print("  filter {:<6}{}\n", type, filter_text(p[type]));
+  if (d.contains("cube")) fmt::print("  cube         {}\n", cube_text(d["cube"]));
 }
 
 void add_probe(Json& entry, Device& device) {
   add_test(entry, test_of(device));
   entry["probe"] = probe_json(probe_sampler(device));
+  if (test_of(device).passed()) entry["cube"] = certified_cube(device);
 }
 
 /// What cannot be opened is shown with the reason, beside the others.
@@ -140,11 +145,17 @@ Json listed_json(const ListedDevice& listed, bool probe, const CommonOptions& co
   return entry;
 }
 
+bool has_type(const Json& list, const char* type) {
+  return std::any_of(list.begin(), list.end(),
+                     [&](const Json& d) { return d["type"] == type && !d.contains("trouble"); });
+}
+
 }  // namespace
 
 int devices_command(Arguments& args) {
   args.flag("probe",
-            "test the arithmetic, and measure the sampler's error and bandwidth (of --device, or of all)");
+            "what a machine lacks; test each device's arithmetic, measure its sampler's error and bandwidth, "
+            "certify a small volume (of --device, or of all)");
   add_common(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
@@ -158,9 +169,16 @@ int devices_command(Arguments& args) {
     for (const ListedDevice& listed : describe_devices())
       list.push_back(listed_json(listed, args.has("probe"), common));
   }
-  print_result(common, Json{{"devices", list}}, [&] {
+  Json json{{"devices", list}};
+  if (args.has("probe")) {
+    const OpenClSetup setup = opencl_setup();
+    json["setup"] = setup_json(setup, missing_drivers(setup, has_type(list, "cpu"), has_type(list, "gpu")));
+  }
+  print_result(common, json, [&] {
+    if (json.contains("setup")) print_setup(json["setup"]);
     if (list.empty()) fmt::print("no OpenCL device; install one, for a CPU the package pocl-opencl-icd\n");
     for (const Json& entry : list) print_device(entry);
+    if (json.contains("setup")) print_how_to_report();
   });
   return 0;
 }

@@ -1,6 +1,7 @@
-// Double precision to float, rounded outward: ends of intervals.
+// Double precision to float, rounded outward: ends of intervals, and bounds.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -13,5 +14,14 @@ inline float down(double x) {
 }
 /// The least float that is not below x.
 inline float up(double x) { return -down(-x); }
+
+/// A normal fp32 number that is not below x >= 0: no bound becomes 0 or is lost. What fp32 cannot hold
+/// becomes infinite, NaN too.
+inline float round_up(double x) {
+  using limits = std::numeric_limits<float>;
+  if (!(x <= static_cast<double>(limits::max()))) return limits::infinity();
+  const auto nearest = static_cast<float>(std::max(x, static_cast<double>(limits::min())));
+  return static_cast<double>(nearest) < x ? nearest * (1 + 0x1p-23f) : nearest;
+}
 
 }  // namespace vdvr

@@ -11,7 +11,7 @@
 #include "host/base/opencl/write_later.hpp"
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
-#include "host/base/system/round_up.hpp"
+#include "host/base/system/outward.hpp"
 #include "host/field/fbp/back_project.hpp"
 #include "host/volume/bricks.hpp"
 #include "shared/fourth_differences.h"
