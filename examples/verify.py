@@ -4,13 +4,12 @@
 
 Needs numpy and h5py. Written from docs/file-format.md, docs/geometry.md and docs/inputs.md: F by its definition (ramp
 filter, cosine series between the pixels, sum over the views), V by its own (trilinear between a brick's samples), both
-in double precision, compared in every brick, half of the points where the file is worst. Points cannot prove a bound;
-they can refute one. Exit status: 0 nothing speaks against the certificate; 1 it is wrong, or was altered; 2 the file
-or the scan cannot be read, or asks for what is not done here (it says what).
+in double precision, compared in every brick, half of the points where the file is worst. Points can refute a bound and
+cannot prove it. Exit status: 0 nothing speaks against the certificate; 1 it is wrong, or was altered; 2 file or scan
+cannot be read, or ask for what is not done here: it says what.
 """
 import argparse, hashlib, json, re, sys  # noqa: E401
 from pathlib import Path
-
 import h5py
 import numpy as np
 
@@ -126,7 +125,7 @@ class Volume:
             numbers = np.arange(len(self.tiles.get(triple, ()))) if any(triple) else 0 * used
             need(np.array_equal(used, numbers), f"level {triple}: every tile belongs to exactly one brick")
         least = 4 if self.coarsening.any() else 3 if len(types) >= len(self.tiles) else 1 if self.step is None else 2
-        need(self.version >= least, f"format_version {self.version} has no such contents: {least} has")
+        need(self.version >= least, f"format_version {self.version} has no such contents; {least} has")
 
     def _read_certificate(self):
         f = self.file
@@ -419,9 +418,8 @@ def contradictions(c, v, scan, field):
         yield all(worst), "measured_total is not the largest of /brick_total, or worst_at lies in another brick"
     yield c["input"]["sha256"] == scan.sha256(), "input.sha256 is not that of the scan"
     yield c["input"]["shape"] == list(field.shape), "input.shape is not that of the scan"
-    geometry = c["options"]["geometry"]
     yield c["rates"]["gold"] == v.rate, "rates.gold is not the rate of the file"
-    yield same(geometry["theta_rad"], scan.theta) or scan.cone, "options.geometry.theta_rad are not the scan's angles"
+    yield same((geometry := c["options"]["geometry"])["theta_rad"], scan.theta) or scan.cone, "options.geometry.theta_rad are not the scan's angles"
     if scan.cone:
         given, scale = np.ravel(geometry["cone"]["matrices"]), np.abs(field.seen).max(axis=2, keepdims=True)
         equal = given.size == field.seen.size and same(given.reshape(-1, 3, 4) / scale, field.seen / scale)
@@ -473,10 +471,9 @@ def distances(c, v, scan, field, count, seed):
     if len(points) and c["window"] is None and c["roi"] is None:  # F is largest and least where V leaves it open
         values, margin = v.at(points), 2 * c["total"]["buffer"]
         points = points[(values >= values.max() - margin) | (values <= values.min() + margin)]
-    if len(points):  # a scan of one row covers no sample
-        span, apart = np.ptp(field.at(points)), 2 * (beside + budget["projection"]["value"])
-        print(f"  range of F {span:.6g}, reference_range {c['reference_range']:.6g}")
-        yield abs(span - c["reference_range"]) <= apart, "reference_range is not F's"
+    span = np.ptp(field.at(points)) if len(points) else c["reference_range"]  # a scan of one row covers no sample
+    print(f"  range of F {span:.6g}, reference_range {c['reference_range']:.6g}")
+    yield abs(span - c["reference_range"]) <= 2 * (beside + budget["projection"]["value"]), "reference_range is not F's"
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
