@@ -63,6 +63,7 @@ class Volume:
         need(text(root["format"]) == b"vdvr" and 1 <= self.version <= 4, f"no vdvr, or of version {self.version}")
         self.cells, self.coarsening = (np.array(grid.get(a, (0, 0, 0)), int) for a in ("cells", "coarsening"))
         self.origin, self.spacing = (np.array(grid[a], float) for a in ("origin", "spacing"))
+        need(("coarsening" in grid) == (self.version == 4), "coarsening belongs to version 4, and to no other")
         self.g, self.rate, self.unit = int(grid["granularity"]), int(grid["rate"]), text(grid["unit"])
         n, c = self.cells, self.coarsening
         need(all(a.shape == (3,) for a in (n, c, self.origin, self.spacing)), "/grid: three numbers an axis")
@@ -82,26 +83,26 @@ class Volume:
         return data[...]
 
     def _samples(self, name, shape, tables):
-        """Samples in float64, and each tile's step: step * (offset + stored 2^shift) of integers."""
+        """Samples in float64, step * (offset + stored 2^shift) of integers; and their type."""
         stored = self._array(name, shape, "<f4", "<u2", "|u1").reshape(-1, *shape[-3:])
         whole = stored.dtype.kind == "u"
         need(all((table is not None) == whole for table in tables), f"/{name}: offset and shift are for integers")
         if not whole:
             need(np.isfinite(stored).all(), f"/{name}: a sample is not finite")
-            return stored.astype(float), np.zeros(len(stored)), stored.dtype.str
+            return stored.astype(float), stored.dtype.str
         need(self.step is not None, f"/{name}: integers need the attribute step")
         offset, shift = (np.array(table, np.int64).reshape(-1, 1, 1, 1) for table in tables)
         need(len(offset) == len(shift) == len(stored), f"/{name}: one offset and one shift a tile")
         need((0 <= shift).all() and (shift <= 24).all() and not (offset % (1 << shift)).any(), f"/{name}: a wrong offset or shift")
         number = offset + (stored.astype(np.int64) << shift)
         need((np.abs(number) < 1 << 24).all(), f"/{name}: a sample of 2^24 steps or more")
-        return self.step * number, self.step * 2.0 ** shift.ravel(), stored.dtype.str
+        return self.step * number, stored.dtype.str
 
     def _read_index(self):
         f, bricks = self.file, -(-self.cells // self.g)
         self.level, self.tile = self._array("level", (*bricks, 3), "|u1"), self._array("tile", bricks, "<u4")
         tables = [f["base"].attrs.get(name) for name in TABLES]
-        base, base_step, _ = self._samples("base", (self.cells >> self.coarsening) + 1, tables)
+        base, kind_of_base = self._samples("base", (self.cells >> self.coarsening) + 1, tables)
         self.tiles, types, names = {(0, 0, 0): base}, set(), sorted(f["tiles"])
         self.triples = [name for name in names if not name.endswith(tuple(TABLES))]
         for name in names:
@@ -114,8 +115,7 @@ class Volume:
             shape = np.ldexp(self.g, level - self.coarsening).astype(int) + 1
             tables = [self._array(f"tiles/{name}_{table}", (count,), kind) if f"{name}_{table}" in names else None
                       for table, kind in TABLES.items()]
-            values, steps, kind = self._samples(f"tiles/{name}", (0, *shape), tables)
-            need((steps <= base_step).all() or not base_step[0], f"/tiles/{name}: a step coarser than the base's")
+            values, kind = self._samples(f"tiles/{name}", (0, *shape), tables)
             triple, before = tuple(level.tolist()), [n for n in (name[:3], name[:3] + "_1") if n < name]
             need((triple, kind) not in types and {*before} <= {*names}, f"/tiles/{name}: a type twice, or without the one before")
             types.add((triple, kind))
@@ -124,8 +124,8 @@ class Volume:
             used = np.sort(self.tile[(self.level == triple).all(axis=3)])
             numbers = np.arange(len(self.tiles.get(triple, ()))) if any(triple) else 0 * used
             need(np.array_equal(used, numbers), f"level {triple}: every tile belongs to exactly one brick")
-        least = 4 if self.coarsening.any() else 3 if len(types) >= len(self.tiles) else 1 if self.step is None else 2
-        need(self.version >= least, f"format_version {self.version} has no such contents; {least} has")
+        floats = {kind_of_base, *(stored for _, stored in types)} == {"<f4"}
+        need(floats == (self.step is None), "the attribute step goes with integers")
 
     def _read_certificate(self):
         f = self.file
@@ -136,7 +136,9 @@ class Volume:
         self.comparison = "comparison" in f or self.certificate.get("comparison", False)
         self.totals, self.sigma = (self._array(name, self.tile.shape, "<f4") if name in f else None
                                    for name in ("brick_total", "brick_sigma"))
-        need(all(a is None or np.isfinite(a).all() for a in (self.totals, self.sigma)), "a brick's bound is not finite")
+        most = self.certificate["measured_total"] * (1 + 2.0**-20)
+        need(self.totals is None or (self.totals <= most).all(), "a brick's total is above measured_total")
+        need(("noise" not in self.certificate) or (0 < self.sigma).all() and (self.sigma < np.inf).all(), "a wrong sigma")
 
     def content_hash(self):
         f, base = self.file, self.file["base"].attrs
@@ -153,7 +155,7 @@ class Volume:
         f, totals = self.file, np.empty(0, "<f4") if self.totals is None else self.totals
         counted = lambda part, n=None: [np.array(len(part) if n is None else n, "<i8"), part]
         parts = [b"vdvr seal 1\n", *counted(self.text), *counted(totals, totals.size)]
-        known = ("base", "brick_total", "certificate", "comparison", "grid", "level", "tile", "tiles")
+        known = ("base", "brick_sigma", "brick_total", "certificate", "comparison", "grid", "level", "tile", "tiles")
         for path in sorted(["/", *("/" + n for n in known if n in f), *("/tiles/" + n for n in f["tiles"])]):
             for name in sorted(set(f[path].attrs) - ({"seal"} if path == "/" else set())):
                 value, parts = f[path].attrs[name], parts + counted(path.encode()) + counted(name.encode())
@@ -403,7 +405,7 @@ def contradictions(c, v, scan, field):
     yield c["content_sha256"] == v.content_hash(), "content_sha256 is not that of the samples"
     yield (seal is not None) == sealed and (not sealed or text(seal).decode() == v.seal()), "the seal is not the file's"
     yield not sealed or v.totals is not None, "a sealed file must have /brick_total"
-    yield c.get("noise", {}).get("brick_sigma_sha256") == sigma, "noise.brick_sigma_sha256 is not that of /brick_sigma"
+    yield "noise" not in c or c["noise"]["brick_sigma_sha256"] == sigma, "noise.brick_sigma_sha256 is not that of /brick_sigma"
     yield v.differing_samples() == 0, "bricks store different values of a sample that they share"
     yield same(c["epsilon_abs"], c["epsilon"] * c["reference_range"]), "epsilon_abs is not epsilon of reference_range"
     yield same(c["total"]["buffer"], sum(parts)), "total.buffer is not the sum of its terms"
@@ -476,16 +478,14 @@ def distances(c, v, scan, field, count, seed):
     yield abs(span - c["reference_range"]) <= 2 * (beside + budget["projection"]["value"]), "reference_range is not F's"
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     for name, kind, default in (("file", str, None), ("scan", str, None), ("--points", int, 4000), ("--seed", int, 1)):
         parser.add_argument(name, type=kind, default=default)
     words = parser.parse_args()
     try:
-        v = Volume(words.file)
-        c = v.certificate
+        c = (v := Volume(words.file)).certificate
         need(not v.comparison, f"{words.file}: a comparison, which promises nothing")
-        scan = Scan(words.scan, c)
-        field = Field(scan, c)
+        field = Field(scan := Scan(words.scan, c), c)
         print(f"{words.file}: format {v.version}, {'x'.join(map(str, v.cells[::-1]))} cells, {len(scan.p)} views, "
               f"{'cone' if scan.cone else 'parallel'} beam; total {c['total']['buffer']:.6g} of {c['epsilon_abs']:.6g}")
         wrong = [message for right, message in contradictions(c, v, scan, field) if not right]

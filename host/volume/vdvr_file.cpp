@@ -14,6 +14,7 @@
 #include "host/base/system/limits.hpp"
 #include "host/base/system/read_in_child.hpp"
 #include "host/files/hdf5/hdf5_reader.hpp"
+#include "host/files/io/text_encoding.hpp"
 #include "host/volume/seal.hpp"
 #include "host/volume/validate_volume.hpp"
 #include "host/volume/vdvr_layout.hpp"
@@ -55,6 +56,8 @@ void read_grid(const h5::Reader& file, int version, MixedVolume& v) {
     v.grid.spacing[a] = spacing[2 - a];
   }
   v.grid.unit = file.text_attribute("/grid", "unit");
+  if (utf8_of(v.grid.unit) != v.grid.unit)
+    file.refuse("attribute 'unit' of /grid", "is no UTF-8, or begins with a byte order mark");
   v.granularity = read_small(file, "granularity");
   v.rate = read_small(file, "rate");
   if (version >= 4) {
@@ -310,7 +313,9 @@ void read_step(const h5::Reader& file, const Contents& c, MixedVolume& v) {
 
 /// The certificate, or the record of a comparison; earlier versions kept that as a certificate which says so.
 Certificate read_certificate(const h5::Reader& file, const std::string& path, std::string& json) {
-  const bool record = file.has(kComparison) && !file.has(kCertificate);
+  const bool record = file.has(kComparison);
+  if (record && file.has(kCertificate))
+    file.refuse(kComparison, "stands beside a certificate, and only one of them can speak of the volume");
   const char* name = record ? kComparison : kCertificate;
   json = file.text(name, std::min(longest_certificate, file.file_bytes()));
   Certificate c;
