@@ -61,9 +61,9 @@ class Volume:
         root, grid = self.file.attrs, self.file["grid"].attrs
         self.version = int(root["format_version"])
         need(text(root["format"]) == b"vdvr" and 1 <= self.version <= 4, f"no vdvr, or of version {self.version}")
-        self.cells, self.coarsening = (np.array(grid.get(a, (0, 0, 0)), int) for a in ("cells", "coarsening"))
+        self.cells = np.array(grid["cells"], int)
+        self.coarsening = np.array(grid["coarsening"] if self.version == 4 else (0, 0, 0), int)
         self.origin, self.spacing = (np.array(grid[a], float) for a in ("origin", "spacing"))
-        need(("coarsening" in grid) == (self.version == 4), "coarsening belongs to version 4, and to no other")
         self.g, self.rate, self.unit = int(grid["granularity"]), int(grid["rate"]), text(grid["unit"])
         n, c = self.cells, self.coarsening
         need(all(a.shape == (3,) for a in (n, c, self.origin, self.spacing)), "/grid: three numbers an axis")

@@ -14,7 +14,6 @@
 #include "host/base/system/limits.hpp"
 #include "host/base/system/read_in_child.hpp"
 #include "host/files/hdf5/hdf5_reader.hpp"
-#include "host/files/io/text_encoding.hpp"
 #include "host/volume/seal.hpp"
 #include "host/volume/validate_volume.hpp"
 #include "host/volume/vdvr_layout.hpp"
@@ -56,8 +55,6 @@ void read_grid(const h5::Reader& file, int version, MixedVolume& v) {
     v.grid.spacing[a] = spacing[2 - a];
   }
   v.grid.unit = file.text_attribute("/grid", "unit");
-  if (utf8_of(v.grid.unit) != v.grid.unit)
-    file.refuse("attribute 'unit' of /grid", "is no UTF-8, or begins with a byte order mark");
   v.granularity = read_small(file, "granularity");
   v.rate = read_small(file, "rate");
   if (version >= 4) {
