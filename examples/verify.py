@@ -217,11 +217,11 @@ class Scan:
         if isinstance(angles, str):
             angles = [*map(float, re.sub("#.*|,", " ", self._use(angles).read_text("utf-8-sig")).split())]
         need(angles is not None and len(angles) == len(self.p), f"there must be {len(self.p)} angles")
-        radians = m.get("angle_unit", "degrees" if angles is not self.theta else self.theta_unit).lower().startswith("rad")
+        unit = self.options.get("angle_unit") or m.get("angle_unit") or (self.theta_unit if angles is self.theta else "degrees")
         views = self.options.get("views") or m.get("use") or [0, len(self.p)]
         chosen = np.concatenate([np.arange(*r) for r in (views if isinstance(views[0], list) else [views])])
         self.theta, self.p = np.array(angles, float)[chosen], self.p[chosen]
-        self.theta, self.cone = self.theta if radians else np.radians(self.theta), bool({"geometry", "matrices"} & set(m))
+        self.theta, self.cone = self.theta if unit.lower().startswith("rad") else np.radians(self.theta), bool({"geometry", "matrices"} & set(m))
         need(np.isfinite(self.p).all(), "the scan holds values that are not finite")
         self.matrices = self._matrices(m) if self.cone else None
 
@@ -297,8 +297,7 @@ def filtered(p, tau, name, cutoff):
 
 def cosine_coefficients(q):
     """a [view][m][n], with q(u, v) = sum of a cos(pi m (v + 1/2) / V) cos(pi n (u + 1/2) / U)."""
-    def matrix(n):
-        return np.cos(np.pi / n * np.outer(np.arange(n), np.arange(n) + 0.5)) * (2 - np.eye(n)[0])[:, None] / n
+    matrix = lambda n: np.cos(np.pi / n * np.outer(np.arange(n), np.arange(n) + 0.5)) * (2 - np.eye(n)[0])[:, None] / n
     return matrix(q.shape[1]) @ q @ matrix(q.shape[2]).T
 
 def view_weights(angle, period):
@@ -309,16 +308,17 @@ def view_weights(angle, period):
     order, a = np.roll(order, -start), np.append(a[start:], a[:start] + period)
     gap, runs, i = np.diff(a, append=a[0] + period), [], 0
     while i < len(a):
-        one = [j for j in range(i, len(a)) if a[j] - a[i] <= min(gap[i - 1], gap[j]) / (4 if j - i >= 2 else 1000)]
-        runs.append((i, one[-1] + 1))
-        i = one[-1] + 1
+        last = max(j for j in range(i, len(a)) if a[j] - a[i] <= min(gap[i - 1], gap[j]) / (4 if j - i > 1 else 1000))
+        runs.append((i, i := last + 1))
     mean = np.array([a[i:j].mean() for i, j in runs])
     gap = np.diff(mean, append=mean[0] + period)
     wide = np.sort(gap)[::-1]
-    wedges = max((n for n in range(1, min(8, len(gap))) if wide[n - 1] > 4 * wide[n]), default=0)
-    rest = wide[wedges:][::-1]
-    usual = rest[np.searchsorted(np.cumsum(rest), (rest.sum() + wedges * rest[-1]) / 2).clip(max=len(rest) - 1)]
-    need(rest[-1] <= 2 * usual and wedges < 4, "such unequal angles are not weighed here")
+    for wedges in range(min(7, len(gap) - 1), -1, -1):  # the widest gaps, as many as stand apart
+        rest = wide[wedges:][::-1]
+        usual = rest[(np.cumsum(rest) > (0.5 + 1e-9) * (rest.sum() + wedges * rest)).argmax()]
+        if not wedges or wide[wedges - 1] > max(2 * rest[-1], min(4 * rest[-1], (np.log(len(gap)) + 8) * usual / 1.678)):
+            break
+    need(wedges < 4, "angles with four or more wide gaps are not weighed here: they may be a coarse part of the scan")
     gap, weight = np.where(gap > rest[-1], 4 * usual, gap), np.empty(len(a))
     for n, (i, j) in enumerate(runs):
         weight[order[i:j]] = (gap[n - 1] + gap[n]) / 2 / (j - i)

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 vdvr, source = sys.argv[1], Path(sys.argv[2])
+sys.dont_write_bytecode = True  # examples/ is installed as it is
 sys.path.insert(0, str(source / "examples"))
 import verify  # noqa: E402
 

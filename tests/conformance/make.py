@@ -16,6 +16,7 @@ import h5py
 import numpy as np
 from writer import ABSENT, File, finish
 
+sys.dont_write_bytecode = True  # examples/ is installed as it is
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "examples"))
 import verify  # noqa: E402
 

@@ -13,6 +13,7 @@ import h5py
 import numpy as np
 
 vdvr, script = sys.argv[1], Path(sys.argv[2]) / "examples/verify.py"
+sys.dont_write_bytecode = True  # examples/ is installed as it is
 spec = importlib.util.spec_from_file_location("verify", script)
 verify = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(verify)
@@ -26,7 +27,7 @@ SCANS = {
     "row.h5": "--detector 33x1 --angles 48",
     "turn": CONE + " --tilt 2,3",
     "short": CONE + " --arc 220",
-    "displaced": CONE + " --detector-offset 4.3",
+    "displaced": CONE + " --detector-offset 4.3 --tilt 1,2",
 }
 FILES = {
     "integers": ("plain.h5", "--epsilon 5%"),
@@ -34,7 +35,7 @@ FILES = {
     "filter": ("plain.h5", "--epsilon 5% --filter hann --filter-cutoff 0.7 --granularity 8 --center 16.3"),
     "window": ("plain.h5", "--epsilon 5% --window 0.1,0.4"),
     "region": ("plain.h5", "--epsilon 5% --roi=-5,-4,-2,6,7,3"),
-    "spacing": ("uneven.h5", "--epsilon 5% --filter cosine --spacing 1.5,0.8 --granularity 2"),
+    "spacing": ("uneven.h5", "--epsilon 5% --filter cosine --spacing 1.5,0.8 --granularity 2 --views 0:12,14:32"),
     "sigma": ("counts.h5", "--epsilon 2sigma"),
     "coarse-base": ("tall.h5", "--epsilon 10% --base 2x2x2 --size 32x32x16 --origin=-16,-16,-8"),
     "row": ("row.h5", "--epsilon 3%"),
@@ -180,6 +181,15 @@ def forgeries(folder):
     ]
 
 
+def by_matrices(folder):
+    """The same scan with its geometry as matrices, of any scale."""
+    described = json.loads((folder / "scan.json").read_text())
+    matrices = verify.Scan(folder, {"options": {}}).matrices
+    np.save(folder / "P.npy", matrices * np.linspace(0.5, 2, len(matrices))[:, None, None])
+    described.pop("geometry")
+    (folder / "scan.json").write_text(json.dumps({**described, "matrices": "P.npy"}))
+
+
 def mirror(f):
     """The samples of the base backwards along x; tiles, levels and totals with them."""
     for name in f["tiles"]:
@@ -216,6 +226,7 @@ with tempfile.TemporaryDirectory() as place:
     shutil.copy(folder / "plain.h5", folder / "uneven.h5")
     with h5py.File(folder / "uneven.h5", "a") as f:  # unequal steps, a direction twice, a wedge that was not seen
         f["exchange/theta"][...] = np.sort(np.append(np.arange(31) * 4.8 + np.arange(31) % 3, 9.6))
+    by_matrices(folder / "turn")
     for name, (scan, options) in FILES.items():
         must(vdvr, "build", folder / scan, *options.split(), "-o", folder / f"{name}.vdvr", "--quiet")
         print(verified(folder / f"{name}.vdvr", folder / scan, 0), flush=True)
