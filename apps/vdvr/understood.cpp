@@ -7,10 +7,11 @@
 #include <numbers>
 #include <nlohmann/json.hpp>
 
-#include "vdvr/expert/extend_rows.hpp"
 #include "apps/common/messages.hpp"
 #include "apps/vdvr/cone.hpp"
 #include "apps/vdvr/output.hpp"
+#include "vdvr/expert/extend_rows.hpp"
+#include "vdvr/expert/preparation.hpp"
 
 namespace vdvr::cli {
 namespace {

@@ -13,7 +13,6 @@
 #include "vdvr/expert/exact_field.hpp"
 #include "vdvr/expert/extend_rows.hpp"
 #include "vdvr/expert/rows_to_verify.hpp"
-#include "vdvr/expert/simulate.hpp"
 #include "vdvr/expert/verify.hpp"
 
 using namespace vdvr;
@@ -21,7 +20,7 @@ using support::device;
 
 namespace {
 
-// Of smooth parts, what the feature promises.
+// What the feature promises of smooth parts; 1e-4 was seen.
 constexpr double promised = 0.01;
 
 struct Turn {
@@ -30,12 +29,36 @@ struct Turn {
   std::int64_t columns = 60, rows = 1;
 };
 
-// Off the axis and unlike from every side; within `radius` of it.
-Phantom object(double radius) {
-  return ellipsoid_list({{1, {0.1 * radius, -0.05 * radius, 0}, {0.85 * radius, 0.7 * radius, radius}, 20},
-                         {0.5, {-0.3 * radius, 0.2 * radius, 0}, {0.25 * radius, 0.2 * radius, radius}, 0},
-                         {-0.5, {0.5 * radius, 0, 0}, {0.2 * radius, 0.3 * radius, radius}, 0}},
-                        0, "three ellipsoids");
+// Discs of density d (1 - r^2 / R^2)^3: smooth everywhere, so that F is theirs but for what the weights do. A
+// line at the distance s from a disc's middle has d 32/35 R (1 - s^2 / R^2)^(7/2).
+struct Disc {
+  double d, x, y, R;
+};
+
+// Unlike from every side, within `radius` of the axis.
+std::vector<Disc> object(double radius) {
+  return {{1, 0.1 * radius, -0.08 * radius, 0.84 * radius},
+          {0.6, -0.37 * radius, 0.24 * radius, 0.3 * radius},
+          {-0.5, 0.4 * radius, 0.05 * radius, 0.28 * radius}};
+}
+
+double density(const std::vector<Disc>& discs, const Vec3& p) {
+  double sum = 0;
+  for (const Disc& disc : discs) {
+    const double rest = 1 - (std::pow(p[0] - disc.x, 2) + std::pow(p[1] - disc.y, 2)) / (disc.R * disc.R);
+    if (rest > 0) sum += disc.d * std::pow(rest, 3);
+  }
+  return sum;
+}
+
+double line_integral(const std::vector<Disc>& discs, double theta, double u) {
+  double sum = 0;
+  for (const Disc& disc : discs) {
+    const double s = u - disc.x * std::cos(theta) - disc.y * std::sin(theta),
+                 rest = 1 - s * s / (disc.R * disc.R);
+    if (rest > 0) sum += disc.d * 32 / 35 * disc.R * std::pow(rest, 3.5);
+  }
+  return sum;
 }
 
 ProjectionSet scan_of(const Turn& t, double radius) {
@@ -48,13 +71,12 @@ ProjectionSet scan_of(const Turn& t, double radius) {
   for (int k = 0; k < t.views; ++k)
     g.theta_rad.push_back(t.arc_deg * std::numbers::pi / 180 *
                           (k + t.jitter * (static_cast<double>(random()) / 2147483648.0 - 1)) / t.views);
-  const Phantom phantom = object(radius);
+  const std::vector<Disc> discs = object(radius);
   for (const double theta : g.theta_rad)
     for (std::int64_t v = 0; v < g.rows; ++v)
       for (std::int64_t i = 0; i < g.columns; ++i)
-        scan.data.push_back(static_cast<float>(
-            phantom.line_integral(theta, static_cast<double>(i) - g.center,
-                                  static_cast<double>(v) - 0.5 * static_cast<double>(g.rows - 1))));
+        scan.data.push_back(
+            static_cast<float>(line_integral(discs, theta, static_cast<double>(i) - g.center)));
   return scan;
 }
 
@@ -65,36 +87,29 @@ Preparation wanted(std::optional<bool> half, Padding padding = Padding::none) {
   return p;
 }
 
-// The largest difference of F from the density where that is the same four columns around, as a share of 1.
-double off_in_smooth_parts(const ProjectionSet& scan, double radius) {
+// The largest difference of F from the density, of 1, at what is covered.
+double off_by(const ProjectionSet& scan, double radius) {
   GridOptions options;
-  options.spacing = 1.5;
+  options.spacing = 2.5;
   const Grid grid = make_grid(scan, options);
   const Volume volume = reconstruct(device(), scan, grid, {});
-  const Phantom phantom = object(radius);
-  const auto smooth = [&](const Vec3& p) {
-    for (int i = 0; i < 16; ++i) {
-      const double phi = i * std::numbers::pi / 8;
-      if (phantom.density({p[0] + 4 * std::cos(phi), p[1] + 4 * std::sin(phi), p[2]}) != phantom.density(p))
-        return false;
-    }
-    return true;
-  };
   const Index3 n = grid.samples();
   double worst = 0;
-  int inside = 0;
+  int covered = 0;
   for (std::int64_t y = 0; y < n[1]; ++y)
     for (std::int64_t x = 0; x < n[0]; ++x) {
-      Vec3 p = grid.position({x, y, 0});
-      p[2] = 0;
-      if (std::hypot(p[0], p[1]) > radius || !smooth(p)) continue;
-      worst = std::max(worst,
-                       std::abs(static_cast<double>(volume.samples[at(y * n[0] + x)]) - phantom.density(p)));
-      ++inside;
+      const Vec3 p = grid.position({x, y, 0});
+      if (!is_covered(scan.geometry, scan.geometry.center, {p[0], p[1], 0})) continue;
+      worst = std::max(worst, std::abs(static_cast<double>(volume.samples[at(y * n[0] + x)]) -
+                                       density(object(radius), p)));
+      ++covered;
     }
-  BOOST_TEST(inside > 300);
+  BOOST_TEST(covered > 500);
   return worst;
 }
+
+// Cheap to certify and to verify at every node.
+const Turn small{.views = 40, .offset = 10, .columns = 36, .rows = 2};
 
 struct Certified {
   ProjectionSet measured, longer;
@@ -107,21 +122,21 @@ Certified certified(const Turn& t, double radius, const Preparation& p) {
   c.longer = c.measured;
   static_cast<void>(extend_rows(c.longer, p));
   CertifyOptions options;
-  options.grid.size = Index3{12, 12, 2};
-  options.grid.origin = Vec3{4, -9, -1};
+  options.grid.size = Index3{8, 8, 1};
+  options.grid.origin = Vec3{3, -6, -0.5};
   c.built = certify(device(), c.longer, Tolerance{.relative = 0.03}, options);
   return c;
 }
 
 }  // namespace
 
-BOOST_AUTO_TEST_CASE(smooth_parts_are_right_to_one_per_cent_however_the_turn_was_made) {
+BOOST_AUTO_TEST_CASE(the_object_comes_out_right_however_the_turn_was_made) {
   constexpr double radius = 38;
   for (const Turn& t : {Turn{}, Turn{.views = 360}, Turn{.offset = -18}, Turn{.jitter = 0.2},
                         Turn{.views = 401, .arc_deg = 400}, Turn{.offset = 24}}) {
     ProjectionSet scan = scan_of(t, radius);
     BOOST_REQUIRE(extend_rows(scan, {}).find("half acquisition") == 0u);
-    const double off = off_in_smooth_parts(scan, radius);
+    const double off = off_by(scan, radius);
     BOOST_TEST_CONTEXT("offset " << t.offset << ", " << t.views << " views, " << t.arc_deg << " degrees")
     BOOST_TEST(off <= promised);
   }
@@ -136,7 +151,7 @@ BOOST_AUTO_TEST_CASE(without_weights_the_object_comes_out_wrong) {
     const float f = factors[i % factors.size()];
     if (f > 0) scan.data[i] /= f;
   }
-  BOOST_TEST(off_in_smooth_parts(scan, 38) > 10 * promised);
+  BOOST_TEST(off_by(scan, 38) > 10 * promised);
 }
 
 BOOST_AUTO_TEST_CASE(the_device_gives_f_of_the_longer_rows) {
@@ -147,7 +162,7 @@ BOOST_AUTO_TEST_CASE(the_device_gives_f_of_the_longer_rows) {
     options.size = Index3{9, 9, 2};
     const Grid grid = make_grid(scan, options);
     const Volume volume =
-        reconstruct(device(), scan, grid, {.upsampling = 32, .interpolation = Interpolation::cubic});
+        reconstruct(device(), scan, grid, {FieldOptions{}, 32, Interpolation::cubic});
     const ExactField exact(scan, {});
     std::vector<Vec3> points;
     const Index3 n = grid.samples();
@@ -166,20 +181,21 @@ BOOST_AUTO_TEST_CASE(the_device_gives_f_of_the_longer_rows) {
 BOOST_AUTO_TEST_CASE(padding_flattens_what_truncation_bends) {
   // Seen for 20 of 50 columns around the axis.
   const Turn t{.views = 180, .arc_deg = 180, .offset = 0, .columns = 41};
+  const std::vector<Vec3> points{{0, 0, 0}, {17, 0, 0}};
   const auto bend = [&](Padding padding) {
     ProjectionSet scan = scan_of(t, 50);
     static_cast<void>(extend_rows(scan, wanted({}, padding)));
-    const std::vector<double> F = ExactField(scan, {}).at(std::vector<Vec3>{{0, 0, 0}, {17, 0, 0}});
-    return std::abs(F[1] - F[0]);
+    const std::vector<double> F = ExactField(scan, {}).at(points);
+    return std::abs(F[1] - density(object(50), points[1]) - F[0] + density(object(50), points[0]));
   };
   const double none = bend(Padding::none), edge = bend(Padding::edge), mirror = bend(Padding::mirror);
   BOOST_TEST(edge < 0.25 * none);
-  BOOST_TEST(mirror < 0.5 * none);
+  BOOST_TEST(mirror < none);
 }
 
 BOOST_AUTO_TEST_CASE(certificates_hold_for_rows_that_verify_makes_itself) {
   for (const Preparation& p : {wanted({}), wanted({}, Padding::edge), wanted(false, Padding::mirror)}) {
-    const Certified c = certified({.views = 60, .rows = 3}, 38, p);
+    const Certified c = certified(small, 22, p);
     const Certificate& stored = c.built.certificate;
     BOOST_TEST((stored.field.preparation == c.longer.report.preparation));
     BOOST_TEST(stored.field.center.value() == c.measured.geometry.center);
@@ -191,20 +207,20 @@ BOOST_AUTO_TEST_CASE(certificates_hold_for_rows_that_verify_makes_itself) {
 }
 
 BOOST_AUTO_TEST_CASE(a_wrong_weight_in_what_was_built_is_found) {
-  Certified c = certified({.views = 60, .rows = 3}, 38, wanted(true));
+  Certified c = certified(small, 22, wanted(true));
   // As if the transition were one column too narrow: the builder's fault, under a certificate of its own.
   ProjectionSet wrong = c.measured;
   wrong.geometry.center += 1;
   static_cast<void>(extend_rows(wrong, wanted(true)));
   ProjectionSet built_from = c.longer;
   for (std::int64_t line = 0; line < wrong.geometry.views() * wrong.geometry.rows; ++line)
-    for (std::int64_t i = 0; i < 60; ++i)
+    for (std::int64_t i = 0; i < 36; ++i)
       built_from.data[at(line * built_from.geometry.columns + built_from.geometry.extension.before + i)] =
           wrong.data[at(line * wrong.geometry.columns + wrong.geometry.extension.before + i)];
   CertifyOptions options;
-  options.grid.size = Index3{12, 12, 2};
-  options.grid.origin = Vec3{4, -9, -1};
-  const BuildResult built = certify(device(), built_from, Tolerance{.relative = 0.002}, options);
+  options.grid.size = Index3{8, 8, 1};
+  options.grid.origin = Vec3{3, -6, -0.5};
+  const BuildResult built = certify(device(), built_from, Tolerance{.relative = 0.01}, options);
   BOOST_TEST(verify(device(), built_from, built.volume, built.certificate, {.exhaustive = true}).holds);
   BOOST_TEST(!verify(device(), rows_to_verify(c.measured, built.certificate.field), built.volume,
                      built.certificate, {.exhaustive = true})
@@ -212,7 +228,7 @@ BOOST_AUTO_TEST_CASE(a_wrong_weight_in_what_was_built_is_found) {
 }
 
 BOOST_AUTO_TEST_CASE(a_certificate_that_names_other_rows_is_found) {
-  const Certified c = certified({.views = 60, .rows = 3}, 38, wanted(true));
+  const Certified c = certified(small, 22, wanted(true));
   for (const Preparation& p : {wanted(false), wanted(true, Padding::edge)}) {
     Certificate forged = c.built.certificate;
     forged.field.preparation = p;

@@ -73,7 +73,6 @@ RowExtension extension_of(const ParallelGeometry& own, bool half, Padding paddin
   RowExtension e;
   e.padding = padding;
   e.center = own.center;
-  if (half) e.half_acquisition = true;
   const Sides sides(own);
   // 1e-9: rounding of the centre makes no further column.
   const auto zeros =
@@ -206,7 +205,8 @@ std::string extend_rows(ProjectionSet& scan, const Preparation& wanted, std::uin
   if (half) recorded.half_acquisition = true;
   if (looks && !half) g.extension.half_acquisition = recorded.half_acquisition = false;
   const std::string words = half ? words_of(g) : "";
-  const RowExtension e = extension_of(g, half, wanted.padding);
+  RowExtension e = extension_of(g, half, wanted.padding);
+  e.half_acquisition = recorded.half_acquisition;
   if (wanted.padding == Padding::none)
     if (const auto [share, side] = left_at_edges(scan, e); share > share_of_object)
       scan.report.notes.push_back(fmt::format(
