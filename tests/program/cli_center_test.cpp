@@ -142,7 +142,7 @@ BOOST_AUTO_TEST_CASE(a_half_acquisition_is_found_and_drawn_and_taken_as_such) {
   };
   const Ended recognised = run(plan), stated = with("on"), off = with("off");
   BOOST_TEST(recognised.code == 0, recognised.err);
-  BOOST_TEST(recognised.err.find("WARNING: half acquisition: a full turn about an axis at column 9.3") !=
+  BOOST_TEST(recognised.err.find("WARNING: half acquisition: a full turn about an axis at column 9.2") !=
                  std::string::npos,
              recognised.err);
   BOOST_TEST(stated.code == 0, stated.err);

@@ -63,7 +63,7 @@ void require_half_acquisition(const ParallelGeometry& own) {
     throw InputError(
         fmt::format("half acquisition: needs a full turn, and {:.1f} degrees of it have no view (the angles "
                     "cover {:.1f}): "
-                    "what lies beyond the nearer edge is seen half a turn later only; `half-acquisition` off "
+                    "what lies beyond the nearer edge is seen half a turn later only; `half_acquisition` off "
                     "takes the views "
                     "as they are",
                     wedges.empty() ? 360.0 : wedges.front() * degrees, arc_of(own) * degrees));
@@ -215,7 +215,7 @@ std::string extend_rows(ProjectionSet& scan, const Preparation& wanted, std::uin
           side, 100 * share));
   if (half || wanted.padding != Padding::none) make_longer(scan, e, max_memory_bytes, scratch);
   if (!half) return {};
-  if (!wanted.half_acquisition) return words + "; `half-acquisition` off says otherwise";
+  if (!wanted.half_acquisition) return words + "; `half_acquisition` off says otherwise";
   scan.report.notes.push_back(words);
   return {};
 }

@@ -63,7 +63,9 @@ ResidualSummary summary_of(const Residual& r, const ProjectionSet& scan) {
             static_cast<double>(scan.data[static_cast<std::size_t>((k * g.rows + v) * wide + column)]) /
             static_cast<double>(factors[static_cast<std::size_t>(column)]));
         largest = std::max(largest, measured);
-        if (i == 0 || i == g.columns - 1) edge = std::max(edge, measured);
+        // The nearer edge of half acquisition is within the object; rows are weighted down to nothing there.
+        if ((i == 0 || i == g.columns - 1) && factors[static_cast<std::size_t>(column)] >= 1)
+          edge = std::max(edge, measured);
         ++out.rays;
         if (std::isnan(r.lo[at])) continue;
         const bool beyond = r.beyond_interpolation(at);
