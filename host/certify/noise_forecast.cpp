@@ -100,7 +100,7 @@ PlanInSigma make_plan_in_sigma(Device& device, const ProjectionSet& scan, double
   if (!(multiple > 0) || !std::isfinite(multiple))
     throw InputError(fmt::format("a tolerance of {} sigma must be positive and finite", multiple));
   FieldOptions field = options.field;
-  field.center = center_of(field, scan.geometry);
+  field.center = stated_center(field, scan.geometry);
   const Grid grid = grid_to_certify(scan, options);
   const int granularity = fitting_granularity(options.plan.granularity, grid);
   PlanInSigma out;

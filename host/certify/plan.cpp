@@ -151,7 +151,7 @@ class Planner {
     ProjectionSet used;
     used.geometry = scan.geometry;
     used.cone = scan.cone;
-    if (field.center && !scan.cone) used.geometry.center = *field.center;
+    if (!scan.cone) used.geometry.center = center_of(field, scan.geometry);
     plan_.notes = check_scan(used);
     plan_.grid = grid;
     plan_.field = field;
@@ -380,7 +380,7 @@ Plan of_all_rows(Plan plan, const RowWindow& window, const ProjectionSet& scan, 
   for (const std::int64_t cells : grid.cells)
     plan.gold_samples *= static_cast<std::uint64_t>(cells * plan.rates.gold + 1);
   ParallelGeometry used = g;
-  if (plan.field.center) used.center = *plan.field.center;
+  used.center = center_of(plan.field, g);
   plan.not_covered_count = count_not_covered(grid, Coverage(used));
   plan.not_covered_fraction =
       static_cast<double>(plan.not_covered_count) / static_cast<double>(grid.sample_count());

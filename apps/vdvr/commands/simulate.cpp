@@ -29,6 +29,7 @@ void add_options(Arguments& args) {
       .value("detector", "UxV", "columns x rows (default 65x65, 129x129, or what the volume needs)")
       .value("pitch", "P[,PV]",
              "world units per column [and per row] (default 1, or the volume's smallest spacing)")
+      .value("detector-offset", "S", "columns by which the detector is moved towards higher ones (default 0)")
       .flag("point", "line integrals at the pixel centres")
       .flag("band-limited", "ideal low-pass at the detector's Nyquist frequency (default)")
       .value("noise-sigma", "S", "Gaussian noise, as a fraction of the largest line integral")
@@ -45,7 +46,6 @@ void add_options(Arguments& args) {
       .value("cone", "R,D",
              "distances from the source to the axis and to the detector; --arc is then 360 by default, and "
              "--pitch that on the detector")
-      .value("detector-offset", "S", "columns by which the detector is moved towards higher ones (default 0)")
       .value("tilt", "IN,OUT", "of the detector in its plane and out of it, degrees (default 0,0)")
       .value("sense", "1|-1", "of rotation (default 1)")
       .value("focal-spot", "W", "side of a square source (default 0: a point)")
@@ -96,7 +96,8 @@ Setup setup_for(const Arguments& args) {
 void apply_cone_options(const Arguments& args, SimulateOptions& scan) {
   const auto distances = args.numbers("cone", 2);
   if (!distances) {
-    refuse(args, {"detector-offset", "tilt", "sense", "focal-spot", "supersampling"}, "goes with --cone");
+    scan.detector_offset = args.number_or("detector-offset", 0);
+    refuse(args, {"tilt", "sense", "focal-spot", "supersampling"}, "goes with --cone");
     return;
   }
   ConeSetup cone;

@@ -83,6 +83,8 @@ struct SimulateOptions {
   double arc_deg = 180;  ///< angles k * arc / angles
   std::int64_t columns = 129, rows = 129;
   double pitch_u = 1, pitch_v = 1;
+  double detector_offset =
+      0;  ///< of parallel beam, columns by which the detector is moved towards higher ones
   std::string unit = "pixel";
   bool band_limited =
       true;  ///< 16x finer line integrals in u, ideal low-pass at the detector's Nyquist, decimation
