@@ -20,6 +20,8 @@ const std::vector<Command>& commands() {
        probe_command},
       {"residual", "SCAN FILE -o OUT", "where no interpolation can explain the measured rays",
        residual_command},
+      {"measure", "FILE (--above C | --mean | ...)",
+       "volumes, means, lines, components: intervals that hold for F", measure_command},
       {"render", "FILE -o IMG.png", "a picture, or a turntable of pictures", render_command},
       {"serve", "FILE", "a volume in the browser, to be turned with the mouse", serve_command},
       {"export", "OUT.vdvr -o VOL", "a certified volume in the format of other programs", export_command},
