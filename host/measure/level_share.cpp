@@ -66,12 +66,21 @@ AffineForm affine_of(const Corners& v) {
   form.slope = {(x0 + x1 + x2 + x3) / 8, (y0 + y1 + y2 + y3) / 8,
                 (v[4] + v[5] + v[6] + v[7] - v[0] - v[1] - v[2] - v[3]) / 8};
   form.middle = (v[0] + v[1] + v[2] + v[3] + v[4] + v[5] + v[6] + v[7]) / 8;
-  // What is left are the products xy, xz, yz and xyz, each at most its coefficient.
+  // What is left are the products xy, xz, yz and xyz: a trilinear function again, largest and least at
+  // corners.
   const double xy = (x1 - x0 + x3 - x2) / 8, xz = (x2 - x0 + x3 - x1) / 8, yz = (y2 - y0 + y3 - y1) / 8,
                xyz = (x3 - x2 - x1 + x0) / 8;
   const auto [least, largest] = std::minmax_element(v.begin(), v.end());
   const double lost = rounding * std::max(std::abs(*least), std::abs(*largest));
-  form.below = form.above = std::abs(xy) + std::abs(xz) + std::abs(yz) + std::abs(xyz) + lost;
+  for (std::size_t i = 0; i < 8; ++i) {
+    const double x = (i & 1) != 0 ? 1 : -1, y = (i & 2) != 0 ? 1 : -1, z = (i & 4) != 0 ? 1 : -1,
+                 rest = x * y * xy + x * z * xz + y * z * yz + x * y * z * xyz;
+    form.below = std::max(form.below, -rest);
+    form.above = std::max(form.above, rest);
+  }
+  form.below += lost;
+  form.above += lost;
+  form.bend = {std::abs(xy) + std::abs(xz), std::abs(xy) + std::abs(yz), std::abs(xz) + std::abs(yz)};
   form.least = *least - lost;
   form.largest = *largest + lost;
   return form;
@@ -90,6 +99,24 @@ Interval share_above(const AffineForm& f, double t) {
   return {std::max(0.0, lo - closed_form_error), std::min(1.0, hi + closed_form_error)};
 }
 
+std::size_t most_bent(const AffineForm& form) {
+  return static_cast<std::size_t>(std::max_element(form.bend.begin(), form.bend.end()) - form.bend.begin());
+}
+
+// The plane's section of the box over its steepest slope: the largest section is 1 there, one that cuts off a
+// corner is a triangle.
+double open_near(const AffineForm& f, double t) {
+  if (f.least >= t || f.largest < t) return 0;
+  const double x = std::abs(f.slope[0]), y = std::abs(f.slope[1]), z = std::abs(f.slope[2]),
+               steepest = std::max({x, y, z}), width = f.below + f.above;
+  if (!(width < 2 * steepest)) return 1;
+  const double corner = std::max(0.0, 0.5 * (x + y + z - std::abs(t - f.middle) + width)),
+               section = corner * corner * steepest;
+  // Slopes are half of what the function changes by along a side.
+  const double share = section < 2 * x * y * z ? section / (2 * x * y * z) : 1;
+  return width / (2 * steepest) * share;
+}
+
 std::array<Part, 2> split(const Part& part, std::size_t axis, double at) {
   std::array<Part, 2> out{part, part};
   const double f = std::clamp((at - part.low[axis]) / (part.high[axis] - part.low[axis]), 0.0, 1.0);
@@ -103,11 +130,15 @@ std::array<Part, 2> split(const Part& part, std::size_t axis, double at) {
   return out;
 }
 
-std::array<Part, 2> halves(const Part& part) {
+std::array<Part, 2> halves(const Part& part, std::size_t axis) {
+  return split(part, axis, part.low[axis] + 0.5 * (part.high[axis] - part.low[axis]));
+}
+
+std::size_t longest_side(const Part& part) {
   std::size_t axis = 0;
   for (std::size_t a = 1; a < 3; ++a)
     if (part.high[a] - part.low[a] > part.high[axis] - part.low[axis]) axis = a;
-  return split(part, axis, part.low[axis] + 0.5 * (part.high[axis] - part.low[axis]));
+  return axis;
 }
 
 Part clipped_to(const Part& part, const Vec3& low, const Vec3& high) {

@@ -17,6 +17,7 @@ using Corners = std::array<double, 8>;
 struct AffineForm {
   double middle = 0;
   Vec3 slope{};
+  Vec3 bend{};  ///< what halving the box across an axis lowers `below` and `above` by, about
   double below = 0, above = 0, least = 0, largest = 0;
 };
 
@@ -30,6 +31,12 @@ double share_of_plane(double middle, const Vec3& slope, double t);
 /// or above everywhere. An infinite t is allowed.
 Interval share_above(const AffineForm& form, double t);
 
+/// About how wide share_above() is, for a fraction of its cost.
+double open_near(const AffineForm& form, double t);
+
+/// The axis across which halving lowers `below` and `above` most.
+std::size_t most_bent(const AffineForm& form);
+
 /// A box and a trilinear function on it.
 struct Part {
   Vec3 low{}, high{};
@@ -40,8 +47,8 @@ struct Part {
 
 /// The part below and the part above a plane across the axis; `at` lies between.
 std::array<Part, 2> split(const Part& part, std::size_t axis, double at);
-/// Halves across the longest side.
-std::array<Part, 2> halves(const Part& part);
+std::array<Part, 2> halves(const Part& part, std::size_t axis);
+std::size_t longest_side(const Part& part);
 /// What of the part lies in the box; an empty one (high below low) where nothing does.
 Part clipped_to(const Part& part, const Vec3& low, const Vec3& high);
 

@@ -11,9 +11,9 @@
 namespace vdvr::measured {
 namespace {
 
-// A part that holds edges is halved so often, where that is worth it: once a side.
+// A part is halved so often at most: once a side.
 constexpr int halvings = 3;
-// What may stay open of a part's volume.
+// What may stay open of the volume of a part that the region's edge cuts.
 constexpr double fine = 0.1;
 
 struct Steps {
@@ -64,10 +64,11 @@ class DistributionOfParts {
                       sure_last = std::max(sure_first, passed(form.largest - bound_)),
                       first = passed(std::nextafter(form.least + bound_, -HUGE_VAL)),
                       last = passed(std::nextafter(form.largest + bound_, HUGE_VAL));
+    // What the affine function leaves open counts where it is more than e.
     const bool cuts = sure_first < sure_last || first < last;
     if (left > 0 &&
         (share.width() > fine || (cuts && form.below + form.above > fine * (form.largest - form.least)))) {
-      for (const Part& half : halves(part)) {
+      for (const Part& half : halves(part, axis_of(part, form, whole))) {
         const Place place = whole ? Place::inside : region_.place(half.low, half.high);
         if (place != Place::outside) add(half, place == Place::inside, sums, left - 1);
       }
@@ -88,6 +89,9 @@ class DistributionOfParts {
   }
 
  private:
+  static std::size_t axis_of(const Part& part, const AffineForm& form, bool whole) {
+    return whole ? most_bent(form) : longest_side(part);
+  }
   /// The number of edges at most `value`.
   [[nodiscard]] std::size_t passed(double value) const {
     return static_cast<std::size_t>(std::upper_bound(edges_.begin(), edges_.end(), value) - edges_.begin());

@@ -68,7 +68,7 @@ class MeanOfParts {
     // What is left open beside what the bound leaves.
     const double open = share.width() * std::max(std::abs(range.lo), std::abs(range.hi)) + range.width();
     if (left > 0 && open > fine_ * bound_) {
-      for (const Part& half : halves(part)) {
+      for (const Part& half : halves(part, longest_side(part))) {
         const Place place = region_.place(half.low, half.high);
         if (place != Place::outside) add(half, place == Place::inside, sums, left - 1);
       }
@@ -139,7 +139,7 @@ class EndsOfParts {
     if (adds_nothing(*least, *largest, ends)) return;
     const double lost = lost_of(*least, *largest);
     if (!whole && left > 0) {
-      for (const Part& half : halves(part)) {
+      for (const Part& half : halves(part, longest_side(part))) {
         const Place place = region_.place(half.low, half.high);
         if (place != Place::outside) add(half, place == Place::inside, ends, left - 1);
       }

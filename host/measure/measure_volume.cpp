@@ -12,15 +12,23 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 // What geometry may leave undecided beside what the bound leaves open: it makes intervals that much wider.
-constexpr double open_share = 0.05;
+constexpr double open_share = 0.1;
+// This share of what may stay undecided is aimed at: one pass mostly does, since parts are halved a little
+// too often.
+constexpr double margin = 1.1;
+constexpr int most_passes = 4;
 
 double above(double x) { return std::nextafter(x, infinity); }
 double below(double x) { return std::nextafter(x, -infinity); }
 
+// Volumes of parts that are undecided, in steps of the square root of 1/2 from a cell of the grid's 4^3 on.
+constexpr std::size_t volume_steps = 96;
+
 /// Of a part or of many, in volumes.
 struct Sums {
   Interval region{0, 0}, sure{0, 0}, possible{0, 0};
-  double out = 0;  ///< surely in the region and surely not in the range
+  double out = 0;                                ///< surely in the region and surely not in the range
+  std::array<double, volume_steps> undecided{};  ///< by what is undecided of one part
 
   Sums& operator+=(const Sums& o) {
     for (auto [a, b] : {std::pair{&region, &o.region}, {&sure, &o.sure}, {&possible, &o.possible}}) {
@@ -28,6 +36,7 @@ struct Sums {
       a->hi += b->hi;
     }
     out += o.out;
+    for (std::size_t i = 0; i < volume_steps; ++i) undecided[i] += o.undecided[i];
     return *this;
   }
 };
@@ -36,44 +45,70 @@ Interval both(const Interval& a, const Interval& b) {
   return {std::max(0.0, a.lo + b.lo - 1), std::min(a.hi, b.hi)};
 }
 
-/// How parts are halved: until what is undecided is at most that share of a part, or it has been halved so
-/// often.
+/// Parts are halved until what is undecided of one is at most that volume, or it has been halved so often.
 struct Fineness {
-  double share = 1;
+  double volume = 0;
   int halvings = 0;
 };
 
 class VolumeOfParts {
  public:
-  VolumeOfParts(const MeasuredRegion& region, const Thresholds& t, const Fineness& fineness)
-      : region_(region), t_(t), fineness_(fineness) {}
+  /// `unit`: the volume of which parts' undecided volumes are counted in steps.
+  VolumeOfParts(const MeasuredRegion& region, const Thresholds& t, const Fineness& fineness, double unit)
+      : region_(region), t_(t), fineness_(fineness), unit_(unit) {}
 
   void add(const Part& part, bool whole, Sums& sums) const { add(part, whole, fineness_.halvings, sums); }
 
  private:
   void add(const Part& part, bool whole, int left, Sums& sums) const {
-    const RangeShares in = shares_in(affine_of(part.value), t_);
+    const AffineForm form = affine_of(part.value);
+    const double v = part.volume();
+    if (whole && left > 0 && open_of(form) * v > fineness_.volume) {
+      for (const Part& half : halves(part, axis_of(part, form, whole))) add(half, whole, left - 1, sums);
+      return;
+    }
+    const RangeShares in = shares_in(form, t_);
     const Interval region = whole ? Interval{1, 1} : region_.share(part.low, part.high);
     const Interval sure = both(region, in.sure), possible = both(region, in.possible);
     const double open = std::max({region.width(), sure.width(), possible.width()});
-    if (left > 0 && open > fineness_.share) {
-      for (const Part& half : halves(part)) {
-        const Place place = whole ? Place::inside : region_.place(half.low, half.high);
+    if (!whole && left > 0 && open * v > fineness_.volume) {
+      for (const Part& half : halves(part, axis_of(part, form, whole))) {
+        const Place place = region_.place(half.low, half.high);
         if (place != Place::outside) add(half, place == Place::inside, left - 1, sums);
       }
       return;
     }
-    const double v = part.volume();
-    sums += {{region.lo * v, region.hi * v},
-             {sure.lo * v, sure.hi * v},
-             {possible.lo * v, possible.hi * v},
-             std::max(0.0, region.lo - in.possible.hi) * v};
+    sums.region.lo += region.lo * v;
+    sums.region.hi += region.hi * v;
+    sums.sure.lo += sure.lo * v;
+    sums.sure.hi += sure.hi * v;
+    sums.possible.lo += possible.lo * v;
+    sums.possible.hi += possible.hi * v;
+    sums.out += std::max(0.0, region.lo - in.possible.hi) * v;
+    if (open > 0) {
+      const double step = std::max(0.0, -2 * std::log2(open * v / unit_));
+      sums.undecided[std::min(volume_steps - 1, static_cast<std::size_t>(step))] += open * v;
+    }
+  }
+  [[nodiscard]] double open_of(const AffineForm& form) const {
+    return std::max({open_near(form, t_.inner_least), open_near(form, t_.inner_largest),
+                     open_near(form, t_.outer_least), open_near(form, t_.outer_largest)});
+  }
+  // Where V bends most; of what the region's edge cuts, the longest side.
+  static std::size_t axis_of(const Part& part, const AffineForm& form, bool whole) {
+    return whole ? most_bent(form) : longest_side(part);
   }
 
   const MeasuredRegion& region_;
   const Thresholds& t_;
   Fineness fineness_;
+  double unit_;
 };
+
+double unit_of(const Field& field) {
+  const Vec3& h = field.volume().grid.spacing;
+  return 64 * h[0] * h[1] * h[2];
+}
 
 Sums add_up(const Field& field, const ValueRange& range, const Fineness& fineness, const Progress& progress) {
   return field.sum_over_bricks(Sums{}, progress, "measure", [&](const BrickCells& cells, Sums& sums) {
@@ -86,13 +121,35 @@ Sums add_up(const Field& field, const ValueRange& range, const Fineness& finenes
       if (sure || out) {
         const Vec3 low = cells.low(), high = cells.high();
         const double v = (high[0] - low[0]) * (high[1] - low[1]) * (high[2] - low[2]), in = sure ? v : 0;
-        sums += {{v, v}, {in, in}, {in, in}, v - in};
+        for (auto [sum, more] : {std::pair{&sums.region, v}, {&sums.sure, in}, {&sums.possible, in}}) {
+          sum->lo += more;
+          sum->hi += more;
+        }
+        sums.out += v - in;
         return;
       }
     }
-    const VolumeOfParts parts(field.region(), t, fineness);
+    const VolumeOfParts parts(field.region(), t, fineness, unit_of(field));
     for_parts(field.region(), cells, [&](const Part& part, bool whole) { parts.add(part, whole, sums); });
   });
+}
+
+/// The volume at which to stop halving, so that what is undecided falls by `excess`. Of n parts of a box that
+/// a surface passes each leaves the n-th part of what one leaves of the n-th part: the sum is least for its
+/// cost where all parts leave the same.
+double volume_for(const std::array<double, volume_steps>& undecided, double excess, double unit) {
+  double all = 0;
+  for (const double u : undecided) all += u;
+  double volume = unit;
+  for (; volume > 0x1p-40 * unit; volume *= std::sqrt(0.5)) {
+    double rest = 0;
+    for (std::size_t i = 0; i < volume_steps; ++i) {
+      const double now = unit * std::pow(0.5, 0.5 * static_cast<double>(i) + 0.25);
+      rest += undecided[i] * std::min(1.0, std::sqrt(volume / now));
+    }
+    if (rest * excess <= margin * all) break;
+  }
+  return volume;
 }
 
 }  // namespace
@@ -132,7 +189,7 @@ RangeShares shares_in(const AffineForm& form, const Thresholds& t) {
 
 Interval volume_of_part(const MeasuredRegion& region, const Part& part, bool whole, const Thresholds& t) {
   Sums sums;
-  VolumeOfParts(region, t, {}).add(part, whole, sums);
+  VolumeOfParts(region, t, {}, part.volume()).add(part, whole, sums);
   return {sums.sure.lo, sums.possible.hi};
 }
 
@@ -140,23 +197,23 @@ VolumeMeasure measure_volume(const Field& field, const ValueRange& range, const 
                              const Progress& progress) {
   require_range(range);
   if (!(options.share > 0)) throw InputError(fmt::format("share: {} is not positive", options.share));
-  // A cell that is halved three times is eight of half the side, of which a surface cuts about four.
-  constexpr std::array<Fineness, 6> passes{Fineness{1, 0}, {0.1, 3},    {0.03, 6},
-                                           {0.01, 9},      {0.003, 12}, {0.001, 15}};
-  Sums s;
-  double undecided = 0;
-  for (const Fineness& fineness : passes) {
+  Fineness fineness;
+  Sums s = add_up(field, range, fineness, progress);
+  const auto undecided = [&] { return s.sure.width() + s.possible.width(); };
+  // What may stay undecided, of the volume and of the region.
+  const auto allowed = [&] {
+    return std::max(options.share * s.possible.hi, open_share * std::max(0.0, s.possible.lo - s.sure.hi));
+  };
+  for (int pass = 0; pass < most_passes; ++pass) {
+    const double excess = std::max(undecided() / allowed(), s.region.width() / (options.share * s.region.hi));
+    if (!(excess > 1)) break;
+    fineness = {volume_for(s.undecided, excess, unit_of(field)), fineness.halvings + 9};
     s = add_up(field, range, fineness, progress);
-    undecided = s.sure.width() + s.possible.width();
-    const double open = std::max(0.0, s.possible.lo - s.sure.hi);
-    if (undecided <= std::max(options.share * s.possible.hi, open_share * open) &&
-        s.region.width() <= options.share * s.region.hi)
-      break;
   }
   VolumeMeasure out;
   out.region = outward(s.region);
   out.volume = outward({s.sure.lo, s.possible.hi});
-  out.undecided = undecided;
+  out.undecided = undecided();
   // What surely is not in the range tells the largest fraction, too; the better counts.
   const double by_volume = out.region.lo > 0 ? out.volume.hi / out.region.lo : 1,
                by_rest = 1 - s.out * (1 - sum_error) / out.region.hi;

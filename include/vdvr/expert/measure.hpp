@@ -78,7 +78,7 @@ struct Distribution {
 
 struct MeasureOptions {
   /// Boxes are halved until what is undecided by geometry is below this share of the possible volume, or
-  /// below a twentieth of what the bound itself leaves open.
+  /// below a tenth of what the bound itself leaves open.
   double share = 1e-3;
 };
 
