@@ -162,7 +162,8 @@ std::vector<std::string> components_lines(const ComponentTable& t, const std::st
     out.push_back(fmt::format(
         "{:<15}{}; {}; x {:.5g} to {:.5g}, y {:.5g} to {:.5g}, z {:.5g} to {:.5g}; spans x {}, y {}, z {}",
         fmt::format("  {}", i + 1), interval_text(c.volume, unit),
-        c.sure_parts == 0   ? std::string("may not exist")
+        !c.certain()        ? std::string("may hold none")
+        : c.sure_parts == 0 ? std::string("holds some")
         : c.sure_parts == 1 ? std::string("one sure part")
                             : fmt::format("{} sure parts", c.sure_parts),
         c.box[0], c.box[3], c.box[1], c.box[4], c.box[2], c.box[5], text_of(c.spans[0]), text_of(c.spans[1]),

@@ -15,4 +15,5 @@ NB_MODULE(_core, m) {
   vdvr::python::add_certified_pictures(m);
   vdvr::python::add_viewers(m);
   vdvr::python::add_files(m);
+  vdvr::python::add_measures(m);
 }

@@ -32,7 +32,7 @@ struct MeasuredComponent {
   std::array<Answer, 3> spans{};
 
   /// F is in the range somewhere in it, so that at least one component of F exists there.
-  [[nodiscard]] bool certain() const { return sure_parts > 0; }
+  [[nodiscard]] bool certain() const { return sure_parts > 0 || volume.lo > 0; }
 };
 
 /// Where a point of the options lies.
