@@ -27,8 +27,9 @@ constexpr std::size_t volume_steps = 96;
 /// Of a part or of many, in volumes.
 struct Sums {
   Interval region{0, 0}, sure{0, 0}, possible{0, 0};
-  double out = 0;                                ///< surely in the region and surely not in the range
-  std::array<double, volume_steps> undecided{};  ///< by what is undecided of one part
+  double out = 0;  ///< surely in the region and surely not in the range
+  /// Of the range and of the region itself, by what is undecided of one part.
+  std::array<double, volume_steps> undecided{}, edge{};
 
   Sums& operator+=(const Sums& o) {
     for (auto [a, b] : {std::pair{&region, &o.region}, {&sure, &o.sure}, {&possible, &o.possible}}) {
@@ -36,7 +37,10 @@ struct Sums {
       a->hi += b->hi;
     }
     out += o.out;
-    for (std::size_t i = 0; i < volume_steps; ++i) undecided[i] += o.undecided[i];
+    for (std::size_t i = 0; i < volume_steps; ++i) {
+      undecided[i] += o.undecided[i];
+      edge[i] += o.edge[i];
+    }
     return *this;
   }
 };
@@ -45,9 +49,10 @@ Interval both(const Interval& a, const Interval& b) {
   return {std::max(0.0, a.lo + b.lo - 1), std::min(a.hi, b.hi)};
 }
 
-/// Parts are halved until what is undecided of one is at most that volume, or it has been halved so often.
+/// Parts are halved until what is undecided of one is at most that volume, of the range and of the region, or
+/// it has been halved so often.
 struct Fineness {
-  double volume = 0;
+  double volume = 0, edge = 0;
   int halvings = 0;
 };
 
@@ -70,8 +75,8 @@ class VolumeOfParts {
     const RangeShares in = shares_in(form, t_);
     const Interval region = whole ? Interval{1, 1} : region_.share(part.low, part.high);
     const Interval sure = both(region, in.sure), possible = both(region, in.possible);
-    const double open = std::max({region.width(), sure.width(), possible.width()});
-    if (!whole && left > 0 && open * v > fineness_.volume) {
+    const double open = std::max(sure.width(), possible.width());
+    if (!whole && left > 0 && (open * v > fineness_.volume || region.width() * v > fineness_.edge)) {
       for (const Part& half : halves(part, axis_of(part, form, whole))) {
         const Place place = region_.place(half.low, half.high);
         if (place != Place::outside) add(half, place == Place::inside, left - 1, sums);
@@ -85,10 +90,13 @@ class VolumeOfParts {
     sums.possible.lo += possible.lo * v;
     sums.possible.hi += possible.hi * v;
     sums.out += std::max(0.0, region.lo - in.possible.hi) * v;
-    if (open > 0) {
-      const double step = std::max(0.0, -2 * std::log2(open * v / unit_));
-      sums.undecided[std::min(volume_steps - 1, static_cast<std::size_t>(step))] += open * v;
-    }
+    count(sums.undecided, open * v);
+    count(sums.edge, region.width() * v);
+  }
+  void count(std::array<double, volume_steps>& steps, double volume) const {
+    if (!(volume > 0)) return;
+    const double step = std::max(0.0, -2 * std::log2(volume / unit_));
+    steps[std::min(volume_steps - 1, static_cast<std::size_t>(step))] += volume;
   }
   [[nodiscard]] double open_of(const AffineForm& form) const {
     return std::max({open_near(form, t_.inner_least), open_near(form, t_.inner_largest),
@@ -198,22 +206,27 @@ VolumeMeasure measure_volume(const Field& field, const ValueRange& range, const 
   require_range(range);
   if (!(options.share > 0)) throw InputError(fmt::format("share: {} is not positive", options.share));
   Fineness fineness;
+  const double unit = unit_of(field);
   Sums s = add_up(field, range, fineness, progress);
-  const auto undecided = [&] { return s.sure.width() + s.possible.width(); };
-  // What may stay undecided, of the volume and of the region.
-  const auto allowed = [&] {
-    return std::max(options.share * s.possible.hi, open_share * std::max(0.0, s.possible.lo - s.sure.hi));
+  // By what each must fall; at most 1 where it may stay.
+  const auto excess = [&] {
+    const double open = open_share * std::max(0.0, s.possible.lo - s.sure.hi);
+    return (s.sure.width() + s.possible.width()) / std::max(options.share * s.possible.hi, open);
   };
-  for (int pass = 0; pass < most_passes; ++pass) {
-    const double excess = std::max(undecided() / allowed(), s.region.width() / (options.share * s.region.hi));
-    if (!(excess > 1)) break;
-    fineness = {volume_for(s.undecided, excess, unit_of(field)), fineness.halvings + 9};
+  const auto edge_excess = [&] { return s.region.width() / (options.share * s.region.hi); };
+  for (int pass = 0; pass < most_passes && (excess() > 1 || edge_excess() > 1); ++pass) {
+    const Fineness next{volume_for(s.undecided, excess(), unit), volume_for(s.edge, edge_excess(), unit),
+                        fineness.halvings + 9};
+    if (pass == 0) fineness = next;
+    else
+      fineness = {std::min(next.volume, (excess() > 1 ? 0.5 : 1.0) * fineness.volume),
+                  std::min(next.edge, (edge_excess() > 1 ? 0.5 : 1.0) * fineness.edge), next.halvings};
     s = add_up(field, range, fineness, progress);
   }
   VolumeMeasure out;
   out.region = outward(s.region);
   out.volume = outward({s.sure.lo, s.possible.hi});
-  out.undecided = undecided();
+  out.undecided = s.sure.width() + s.possible.width();
   // What surely is not in the range tells the largest fraction, too; the better counts.
   const double by_volume = out.region.lo > 0 ? out.volume.hi / out.region.lo : 1,
                by_rest = 1 - s.out * (1 - sum_error) / out.region.hi;

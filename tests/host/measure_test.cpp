@@ -147,6 +147,9 @@ BOOST_AUTO_TEST_CASE(volumes_and_fractions_of_analytic_fields_lie_in_their_inter
                                                     << ", truth " << truth.lo << " to " << truth.hi);
       BOOST_TEST(overlap(m.region, all));
       BOOST_TEST(overlap(m.fraction, Interval{truth.lo / all.hi, truth.hi / all.lo}));
+      BOOST_TEST(m.region.width() <= 1e-3 * m.region.hi * (1 + 0x1p-20));
+      // Of the volume a tenth of what the bound leaves open, or a thousandth: open <= width - undecided.
+      BOOST_TEST(m.undecided <= std::max(1e-3 * m.volume.hi, 0.1 * (m.volume.width() - m.undecided)) + 1e-9);
       BOOST_TEST((m.volume.lo >= 0 && m.volume.hi <= m.region.hi && m.fraction.hi <= 1));
       ++tried;
       if (m.volume.width() > 0) ++open;

@@ -39,7 +39,7 @@ Phantom foam(double radius, double half_height, int pores, std::uint64_t seed) {
     if (tried == tries)
       throw InputError(
           fmt::format("pores: room for {} of {} was found; ask for fewer", placed.size(), pores));
-    const double r = radius * smallest * std::pow(largest / smallest, uniform(random) * uniform(random));
+    const double r = radius * smallest * std::pow(largest / smallest, uniform(random));
     const double x = (2 * uniform(random) - 1) * radius, y = (2 * uniform(random) - 1) * radius,
                  z = (2 * uniform(random) - 1) * std::max(0.0, half_height - r);
     if (!fits({x, y, z}, r)) continue;
