@@ -21,8 +21,9 @@ namespace vdvr {
 
 /// integral: an X-ray picture, the field summed up along each ray.
 enum class RenderMode { dvr, iso, mip, slice, error, integral };
-/// The content of a picture in modes dvr and iso (depth and error also in mip). It is colours, the depth or the
-/// normal of the thing seen, or the largest bound of the samples that it was made of (Renderer::set_bounds).
+/// The content of a picture in modes dvr and iso (depth and error also in mip). It is colours, the depth or
+/// the normal of the thing seen, or the largest bound of the samples that it was made of
+/// (Renderer::set_bounds).
 enum class RenderOutput { colour, depth, normal, error };
 
 /// An iso-surface; several may be translucent. At most 8 a picture.
