@@ -14,7 +14,7 @@ file(GLOB VDVR_MPI_SOURCES CONFIGURE_DEPENDS apps/mpi/*.cpp)
 function(vdvr_add_mpi target output)
   add_executable(${target} ${VDVR_MPI_SOURCES} $<TARGET_OBJECTS:vdvr_commands>)
   set_target_properties(${target} PROPERTIES OUTPUT_NAME ${output})
-  target_link_libraries(${target} PRIVATE vdvr_serve)
+  target_link_libraries(${target} PRIVATE vdvr_serve vdvr_warnings)
   # Its C++ interface is gone from the standard.
   target_compile_definitions(${target} PRIVATE OMPI_SKIP_MPICXX MPICH_SKIP_MPICXX)
 endfunction()

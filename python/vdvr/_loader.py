@@ -9,6 +9,8 @@ import os
 import sys
 
 _NAME = "libOpenCL.so.1"
+# What Intel's loader needs, and does not say where it is; each after what it needs itself.
+_BEFORE = ("libintlc.so.5", "libirng.so", "libimf.so", "libsvml.so")
 _REMEDY = (
     f"{_NAME} was not found: install Debian's ocl-icd-libopencl1 with a driver of your GPU, or for the processor "
     "`pip install 'vdvr[cpu]'`"
@@ -18,11 +20,15 @@ _REMEDY = (
 def _load() -> None:
     try:
         ctypes.CDLL(_NAME, mode=ctypes.RTLD_GLOBAL)
+        return
     except OSError:
-        brought = os.path.join(sys.prefix, "lib", _NAME)
-        if not os.path.exists(brought):
-            raise ImportError(_REMEDY) from None
-        ctypes.CDLL(brought, mode=ctypes.RTLD_GLOBAL)
+        folder = os.path.join(sys.prefix, "lib")
+    if not os.path.exists(os.path.join(folder, _NAME)):
+        raise ImportError(_REMEDY)
+    for name in (*_BEFORE, _NAME):
+        path = os.path.join(folder, name)
+        if os.path.exists(path):
+            ctypes.CDLL(path, mode=ctypes.RTLD_GLOBAL)
 
 
 _load()
