@@ -1,4 +1,4 @@
-// What a shared library of VDVR shows of itself: the functions and classes marked here, all of include/vdvr.
+// Marks the functions and classes that a shared library of VDVR shows of itself: all of include/vdvr.
 #pragma once
 
 #if defined(__GNUC__)

@@ -21,13 +21,14 @@ struct Brightness {
   double threshold = 0;        ///< between the densest material and the rest (Otsu's criterion)
   double soft = 0;             ///< within the rest, between background and soft material
   Vec3 dense_center{0, 0, 0};  ///< centroid of what lies above the threshold
-  /// Of masks and label maps whose object has lower values than what lies around it: it shows below `soft`,
-  /// and is dense below `threshold`.
+  /// The volume is a mask or a label map whose object has lower values than what lies around it: the object
+  /// shows below `soft`, and is dense below `threshold`.
   bool dense_is_low = false;
 };
-/// Masks and label maps, whose neighbouring samples mostly have equal values, show all that differs from the
-/// value which most samples on the grid's faces have; of other volumes exact zeros do not count, which mean
-/// not covered. Host only. Cost: a few passes over the samples on the grid; memory: a float of each.
+/// Masks and label maps are volumes whose neighbouring samples mostly have equal values. They show all that
+/// differs from the value which most samples on the grid's faces have. In other volumes exact zeros do not
+/// count, since they mean not covered. Host only. Cost: a few passes over the samples on the grid; memory: a
+/// float of each.
 VDVR_API Brightness brightness_of(const MixedVolume& volume);
 
 /// Background clear, soft material a veil, dense material solid, each where the volume's own samples part.
@@ -43,17 +44,17 @@ VDVR_API std::vector<IsoSurface> iso_surfaces(const std::vector<double>& densiti
                                               const std::optional<std::vector<double>>& opacities = {});
 
 /// All of it: two materials, an iso-surface at the threshold, the grey window and the middle of the dense
-/// part for slices, all that the transfer function shows seen at azimuth 30 and elevation 20 degrees
-/// (framing.hpp), steps adapted to the picture. With a certificate the buffer sampler, for which it holds on
-/// every device; whether a device's own may be taken, safe_sampler() knows (safe_sampler.hpp). Everything
-/// else as RenderOptions has it. Cost: brightness_of and shown_points.
+/// part for slices, steps adapted to the picture. The camera sees all that the transfer function shows, at
+/// azimuth 30 and elevation 20 degrees (framing.hpp). With a certificate the buffer sampler, for which it
+/// holds on every device; whether a device's own may be taken, safe_sampler() knows (safe_sampler.hpp).
+/// Everything else as RenderOptions has it. Cost: brightness_of and shown_points.
 VDVR_API RenderOptions automatic_view(const MixedVolume& volume,
                                       const std::optional<Certificate>& certificate = {});
 
 /// True for volumes of a cell or two in z, of which only slices across z show anything.
 VDVR_API bool is_thin(const Grid& grid);
 
-/// What lies between the certified field and the pixels of such a picture: no certificate covers it.
+/// Names the steps between the certified field and the pixels of such a picture that no certificate covers.
 VDVR_API std::string outside_certificate(const RenderOptions& options);
 
 }  // namespace vdvr

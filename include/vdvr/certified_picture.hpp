@@ -23,7 +23,7 @@
 
 namespace vdvr {
 
-/// What intervals of a picture are charged for the sampler.
+/// The charge for the sampler in intervals of a picture.
 struct ChargedSampler {
   std::string sampler;  ///< "buffer" or "image3d"
   double value = 0;     ///< density units; of the texture unit the largest of a brick
@@ -41,7 +41,7 @@ struct PictureRequest {
   /// Modes dvr, iso (one surface), mip, integral and slice, output colour. `clip` is cut with what is
   /// covered. A slice needs `slice_range`; its position is the middle by default.
   RenderOptions options;
-  /// Of mode dvr. Its window is the certificate's.
+  /// For mode dvr. Its window is the certificate's.
   CertifyPictureOptions certify;
   bool lit = false;                 ///< of mode dvr, on one device: under the light of F itself
   bool keep_steps = false;          ///< draw as `options` say: no finer, no other classification or step mode
@@ -76,10 +76,10 @@ struct CertifiedPicture {
 
 /// Draws and certifies. Unless steps are kept, mode dvr is pre-integrated, and drawn with shorter steps as
 /// long as that narrows its bound much. `here`: the certificate as it holds on the devices
-/// (safe_sampler.hpp). Throws InputError for what cannot be certified (a comparison, a window that the
-/// transfer function shows beyond, a part that is not covered, light that has no differences), and for what
-/// render() and certify_pixels() refuse; DeviceError for a device that failed its test; Interrupted. Cost:
-/// one to six pictures, and certify_pixels() or CertifiedRays.
+/// (safe_sampler.hpp). Throws InputError for a picture that cannot be certified (a comparison, a window that
+/// the transfer function shows beyond, a part that is not covered, light that has no differences). Throws
+/// InputError also where render() and certify_pixels() do; DeviceError for a device that failed its test;
+/// Interrupted. Cost: one to six pictures, and certify_pixels() or CertifiedRays.
 VDVR_API CertifiedPicture certify_picture(DrawnVolume& volume, const Certificate& here,
                                           const PictureRequest& request, const Progress& progress = {});
 /// The same of a file, on one device, by the sampler for which its certificate holds there. Throws
@@ -87,7 +87,7 @@ VDVR_API CertifiedPicture certify_picture(DrawnVolume& volume, const Certificate
 VDVR_API CertifiedPicture certify_picture(Device& device, const VdvrFile& file, const PictureRequest& request,
                                           const Progress& progress = {});
 
-/// What lies in the picture's file, where that is not the picture itself.
+/// The content of the picture's file, where that is not the picture itself.
 struct PictureFile {
   std::function<void(const std::filesystem::path&)>
       write;                            ///< none: the picture, as PNG; of iso with stripes
@@ -130,9 +130,9 @@ struct VerifyPictureOptions {
   std::int64_t rays = 16;
 };
 /// Draws and certifies again what X.certificate.json describes, and compares: the file beside it, the pixels,
-/// the statement, every number. Throws FileError for what is no certificate of a picture, MismatchError for
-/// one of another volume and for a volume that was altered, ResourceError where the device cannot draw it;
-/// DeviceError, Interrupted.
+/// the statement, every number. Throws FileError for a file that is no certificate of a picture,
+/// MismatchError for one of another volume and for a volume that was altered. Throws ResourceError where the
+/// device cannot draw it; DeviceError, Interrupted.
 VDVR_API PictureVerification verify_picture(Device& device, const VdvrFile& file,
                                             const std::filesystem::path& certificate,
                                             const VerifyPictureOptions& options = {},

@@ -34,8 +34,8 @@ struct PlannedScan {
   std::optional<BrickSigma> sigma;              ///< of F, where the noise is known
   std::string no_sigma;                         ///< why not, where the noise is
   std::shared_ptr<PictureRefinement> pictures;  ///< none, unless refined for some
-  /// Of a plan for pictures: what is asked of bricks, and the tolerance that holds everywhere, density units.
-  /// The latter throws InputError where it is less than what a brick may be asked for.
+  /// For a plan for pictures: the demands on bricks, and the tolerance that holds everywhere, density units.
+  /// everywhere_abs() throws InputError where that is less than what a brick may be asked for.
   [[nodiscard]] VDVR_API PictureRefinementOptions refinement_options() const;
   [[nodiscard]] VDVR_API double everywhere_abs() const;
 };

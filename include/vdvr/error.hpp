@@ -59,7 +59,7 @@ struct VDVR_API ResourceError : Error {
 struct VDVR_API Interrupted : Error {
   explicit Interrupted(int reason, std::string message = "interrupted")
       : Error(ErrorKind::interrupted, std::move(message)), reason_(reason) {}
-  /// What request_stop was told.
+  /// The reason that request_stop was told.
   [[nodiscard]] int reason() const noexcept { return reason_; }
 
  private:

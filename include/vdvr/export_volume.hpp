@@ -1,5 +1,5 @@
-// A certified volume as files that other programs open: uniform ones (MetaImage, NRRD, TIFF, HDF5, NPY, raw,
-// OME-Zarr), and VTK's, which keep the mixed resolution (export_vtk.hpp). docs/exports.md says what is exact.
+// A certified volume as files that other programs open. Uniform ones are MetaImage, NRRD, TIFF, HDF5, NPY,
+// raw and OME-Zarr; VTK's keep the mixed resolution (export_vtk.hpp). docs/exports.md says what is exact.
 #pragma once
 
 #include <cstdint>
@@ -27,13 +27,13 @@ VDVR_API std::optional<ExportFormat> export_format_of(const std::filesystem::pat
 
 struct ExportOptions {
   ExportFormat format = ExportFormat::mha;
-  /// Samples per cell of the grid and axis, a power of two; of OME-Zarr the finest level's, each other having
-  /// half, down to 1. VTK's blocks have their own.
+  /// Samples per cell of the grid and axis, a power of two. In OME-Zarr it is the finest level's, and each
+  /// other level has half, down to 1. VTK's blocks have their own.
   int oversampling = 1;
   /// u16 and u8 (npy, raw, tiff, hdf5): integers 0 to 2^bits - 1, value = offset + scale * integer.
   SampleType samples = SampleType::f32;
-  /// What the integers span; by default least and largest value of the stored samples. Values beyond become
-  /// the first or last integer.
+  /// The range that the integers span; by default least and largest value of the stored samples. Values
+  /// beyond become the first or last integer.
   std::optional<std::pair<double, double>> range;
   Compression compression = Compression::deflate;  ///< hdf5, ome_zarr and vtm; the others have none
   std::size_t most_blocks = 2000;                  ///< vtm: as in VtkOptions
@@ -67,11 +67,11 @@ VDVR_API std::vector<std::filesystem::path> export_outputs(const std::filesystem
 VDVR_API ExportResult export_volume(const VdvrFile& file, const std::filesystem::path& path,
                                     const ExportOptions& options, const Progress& progress = {});
 
-/// What UniformWriter refuses for its options or for what lies in the way, before anything is computed.
+/// Throws, before anything is computed, where UniformWriter refuses its options or what lies in the way.
 VDVR_API void check_uniform_output(const std::filesystem::path& path, const ExportOptions& options);
 
 /// A uniform volume whose planes come one after the other, in any of these formats but vtm, by the same code.
-/// Of OME-Zarr there is one level. Memory: up to 64 MiB, or one plane.
+/// OME-Zarr has one level then. Memory: up to 64 MiB, or one plane.
 class VDVR_API UniformWriter {
  public:
   /// `oversampling` is 1; integers need a `range`. Throws as check_uniform_output and export_volume.
@@ -92,13 +92,13 @@ class VDVR_API UniformWriter {
 
 /// Where sigma goes beside a volume: NAME-sigma with the volume's ending.
 VDVR_API std::filesystem::path sigma_path(const std::filesystem::path& volume);
-/// Sigma of F (Certificate::brick_sigma), float32, at the samples of `grid`, which is that of an exported
-/// volume, in the same format but vtm. Throws InputError where the certificate does not know it, and as
+/// Sigma of F (Certificate::brick_sigma), float32, at the samples of `grid`, the grid of an exported volume,
+/// in the same format but vtm. Throws InputError where the certificate does not know it, and as
 /// UniformWriter.
 VDVR_API ExportResult export_sigma(const VdvrFile& file, const std::filesystem::path& path, const Grid& grid,
                                    const ExportOptions& options, const Progress& progress = {});
 
-/// log2 of samples per cell along x, y, z of the finest brick: what makes uniform samples hold all of V.
+/// log2 of samples per cell along x, y, z of the finest brick: at this rate uniform samples hold all of V.
 VDVR_API std::array<int, 3> finest_per_cell(const MixedVolume& volume);
 
 }  // namespace vdvr

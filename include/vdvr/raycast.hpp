@@ -21,8 +21,9 @@ namespace vdvr {
 
 /// integral: an X-ray picture, the field summed up along each ray.
 enum class RenderMode { dvr, iso, mip, slice, error, integral };
-/// What a picture shows of modes dvr and iso (depth and error also of mip): colours, where and how what is
-/// seen stands, or the largest bound of the samples that it was made of (Renderer::set_bounds).
+/// The content of a picture in modes dvr and iso (depth and error also in mip). It is colours, the depth or
+/// the normal of the thing seen, or the largest bound of the samples that it was made of
+/// (Renderer::set_bounds).
 enum class RenderOutput { colour, depth, normal, error };
 
 /// An iso-surface; several may be translucent. At most 8 a picture.
@@ -31,25 +32,25 @@ struct IsoSurface {
   std::array<double, 3> rgb{0.93, 0.86, 0.74};
 };
 
-/// How the direction of a surface is found. central: differences over one base cell at the very point, at
-/// every level, without a seam where levels or cells meet. stored: those at the samples, made once a volume
-/// (8 bytes a sample on the device) and interpolated as the field is; without a seam, and several times
-/// faster in bricks with tiles; buffer sampler only. analytic: the derivative of the trilinear cell itself,
-/// which jumps at its faces. automatic: stored for mode dvr where the device has room and the sampler is
-/// `buffer`, else central.
+/// How the direction of a surface is found. `central` takes differences over one base cell at the very point,
+/// at every level, without a seam where levels or cells meet. `stored` takes the differences at the samples,
+/// made once a volume (8 bytes a sample on the device), and interpolates them as the field. It has no seam,
+/// is several times faster in bricks with tiles, and needs the buffer sampler. `analytic` takes the
+/// derivative of the trilinear cell itself, which jumps at its faces. `automatic` takes `stored` for mode dvr
+/// where the device has room and the sampler is `buffer`, else `central`.
 enum class GradientKind { automatic, central, stored, analytic };
 
-/// Mode dvr: colour and opacity of each sample, or of the path between two samples, along which the field is
-/// taken as linear: no transfer function is then too sharp for a step.
+/// Mode dvr: colour and opacity of each sample, or of the path between two samples. Along that path the field
+/// is taken as linear, so no transfer function is too sharp for a step.
 enum class Classification { post, preintegrated };
-/// Mode dvr, with opacities corrected for it: one step throughout; step / 2^l in bricks of level l; or step
-/// / 2^l where the transfer function changes much along a step, l up to 4, so that steep ones draw no lines.
-/// Other modes and D2VR take adaptive for fixed.
+/// Mode dvr, with opacities corrected for the step: one step throughout; step / 2^l in bricks of level l; or
+/// step / 2^l where the transfer function changes much along a step. There l goes up to 4, so that steep
+/// transfer functions draw no lines. Other modes and D2VR take adaptive for fixed.
 enum class StepMode { fixed, level, adaptive };
 
-/// What of a volume is drawn: the points that lie in a box and in an upright cylinder about (axis x, axis y),
-/// both closed, world units. What lies outside is absent, as if the volume ended there: a surface that is cut
-/// shows its inside. Rays enter and leave rounded inward, by at most some 1e-4 of the radius.
+/// The part of a volume that is drawn: the points that lie in a box and in an upright cylinder about (axis x,
+/// axis y), both closed, world units. Everything outside is absent, as if the volume ended there: a surface
+/// that is cut shows its inside. Rays enter and leave rounded inward, by at most some 1e-4 of the radius.
 struct Clip {
   Vec3 low{-std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity(),
            -std::numeric_limits<double>::infinity()},
@@ -71,8 +72,8 @@ struct RenderOptions {
   std::vector<IsoSurface> surfaces;      ///< of mode iso, in any order
   int slice_axis = 2;                    ///< 0 x, 1 y, 2 z
   std::optional<double> slice_position;  ///< world; default the middle
-  /// Grey window of modes slice and integral; default the volume's range, of integral that of the picture's
-  /// values.
+  /// Grey window of modes slice and integral; default the volume's range, in integral the range of the
+  /// picture's values.
   std::optional<std::pair<double, double>> slice_range;
   bool shading = true;
   GradientKind gradient = GradientKind::central;
@@ -88,13 +89,14 @@ struct RenderOptions {
 
 struct RenderResult {
   Image image;
-  /// What lies behind the pixels, NaN where nothing does. Colour: of dvr the opacity; of iso the distance
-  /// from the eye to the first surface along the ray, world units; of mip the maximum; of slice the field; of
-  /// integral the line integral, density times world unit, 0 where a ray meets nothing. Depth: that distance
-  /// of iso, of dvr to the sample that brings the opacity to a half, of mip to the maximum. Normal: three
-  /// channels, x, y, z of the unit vector towards lower density there. Error: the largest bound of the
-  /// samples that add at least 1/512 per base cell to the pixel (of iso and mip: of the points that it
-  /// shows), infinite where one lies in a brick without.
+  /// The values behind the pixels, NaN where there is none. Colour holds the opacity in dvr; in iso the
+  /// distance from the eye to the first surface along the ray, world units; in mip the maximum; in slice the
+  /// field. In integral it holds the line integral, density times world unit, 0 where a ray meets nothing.
+  /// Depth holds that distance in iso, in dvr the distance to the sample that brings the opacity to a half,
+  /// in mip to the maximum. Normal has three channels, x, y, z of the unit vector towards lower density
+  /// there. Error holds the largest bound of the samples that add at least 1/512 per base cell to the pixel,
+  /// in iso and mip of the points that it shows. It is infinite where one of these lies in a brick without a
+  /// bound.
   FloatImage values;
   SamplerKind sampler = SamplerKind::buffer;
   std::string sampler_reason;  ///< why this sampler: measured rates, or what the device lacks
@@ -105,11 +107,11 @@ struct RenderResult {
 
 class D2vrScene;
 
-/// Draws pictures of one volume, or of one scene of projections (d2vr.hpp), and keeps what the next picture
+/// Draws pictures of one volume, or of one scene of projections (d2vr.hpp). It keeps what the next picture
 /// can use: the picture's memory, the transfer function's tables, which bricks can be leapt over.
 ///
 /// Threads: one Renderer belongs to one thread at a time. Any number of them draw one const volume at once,
-/// each in a thread of its own, and give the pictures that one thread gives; the device takes their frames in
+/// each in a thread of its own, and give the pictures that one thread gives. The device takes their frames in
 /// turn, so that RenderResult::seconds counts what others had enqueued. Where memory is short,
 /// GradientKind::automatic may find that others have taken the room for stored gradients.
 ///
@@ -128,11 +130,12 @@ class VDVR_API Renderer {
   /// across x.
   ///
   /// Throws InputError for options out of range; ResourceError when `image3d` is asked for and cannot be had.
-  /// Mode `error` throws InputError: error slices are not ray-cast (error_slice.hpp). Output
-  /// `error` does without set_bounds(). Of scenes see d2vr.hpp.
+  /// Mode `error` throws InputError: error slices are not ray-cast (error_slice.hpp). Output `error` does
+  /// without set_bounds(). For scenes see d2vr.hpp.
   RenderResult render(const RenderOptions& options);
   /// [bz][by][bx] what the field errs by at most in each brick, infinite where nothing is known
-  /// (certificate.hpp, brick_bounds): what RenderOutput::error looks up. Throws InputError for another count.
+  /// (certificate.hpp, brick_bounds). RenderOutput::error looks these up. Throws InputError for another
+  /// count.
   void set_bounds(const std::vector<float>& bounds);
   /// The sampler that a picture with this choice takes: bounds are of one sampler. Throws as render().
   [[nodiscard]] SamplerKind sampler(SamplerKind asked) const;
@@ -142,7 +145,7 @@ class VDVR_API Renderer {
   std::unique_ptr<Impl> impl_;
 };
 
-/// The least and the largest finite value: what mode integral takes for its window. 0, 0 where there is none.
+/// The least and the largest finite value. Mode integral takes them for its window. 0, 0 where there is none.
 VDVR_API std::pair<double, double> range_of_values(const FloatImage& values);
 
 /// One picture by a renderer of its own; a Renderer is faster for several.

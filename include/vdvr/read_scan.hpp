@@ -17,16 +17,16 @@ namespace vdvr {
 
 /// Line integrals: flats and darks averaged, -log with a floor, dead pixels replaced by their neighbours'
 /// median and counted, optional air background taken off, then `preparation`, which the report keeps. Centre:
-/// option, else file, else found from opposite views, else (U-1)/2; of cone beam option, else file, else
+/// option, else file, else found from opposite views, else (U-1)/2. With cone beam: option, else file, else
 /// (U-1)/2. Throws FileError or InputError (NaN, zero flats, wrong counts of angles, truncated files, ...).
 /// `understood` is filled unless it is null.
 VDVR_API ProjectionSet read_scan(const std::filesystem::path& path, const ScanOptions& options = {},
                                  const Progress& progress = {}, Understood* understood = nullptr);
 
-/// What repeated flats and darks of the same scan say of its line integrals, pixel by pixel (photon transfer:
+/// The noise of a scan's line integrals by its repeated flats and darks, pixel by pixel (photon transfer:
 /// Janesick, SPIE Press 2007), of binned ones where `preparation` bins. Nothing of line integrals, of fewer
-/// than five flats, or where flats do not vary. Throws what read_scan() throws of these.
-/// Cost: flats are read three times, darks twice, projections not at all.
+/// than five flats, or where flats do not vary. Throws what read_scan() throws of these. Cost: flats are read
+/// three times, darks twice, projections not at all.
 VDVR_API std::optional<LineIntegralNoise> read_line_noise(const std::filesystem::path& path,
                                                           const ScanOptions& options = {});
 
@@ -34,7 +34,7 @@ VDVR_API std::optional<LineIntegralNoise> read_line_noise(const std::filesystem:
 /// theta in degrees. Written whole or not at all.
 VDVR_API void write_data_exchange(const std::filesystem::path& path, const ProjectionSet& scan);
 
-/// What a detector counts of a scan whose line integrals are exact.
+/// The counts of a detector for a scan whose line integrals are exact.
 struct PhotonCounts {
   double photons = 0;      ///< of a pixel in the open beam, up to 1e9
   std::uint64_t seed = 1;  ///< of Poisson's variates; the same on every machine

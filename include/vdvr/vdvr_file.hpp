@@ -32,13 +32,13 @@ struct VdvrFile {
   std::string altered;  ///< one line: what is not as it was written; empty where all that is hashed is
 };
 
-/// What to do with a file that reads well and is not what was written.
+/// The treatment of a file that reads well and is not as it was written.
 enum class Altered {
   refuse,  ///< MismatchError
   report,  ///< in VdvrFile::altered
 };
 
-/// How samples and index lie in the file; what they decode to, and its hash, are the same.
+/// How samples and index lie in the file. They decode to the same values, with the same hash.
 enum class Compression { none, deflate };
 
 /// Written whole or not at all, chunked, deflated or not, with Fletcher32 checksums, and sealed. An empty
@@ -55,7 +55,7 @@ VDVR_API VdvrFile read_vdvr(const std::filesystem::path& path, std::uint64_t max
                             Altered altered = Altered::refuse);
 
 /// read_vdvr, but that samples of more than a quarter of the limit lie in scratch files in `scratch` (empty:
-/// the default folder of scratch.hpp), of which an eighth of the limit may be resident. Whoever reads them
+/// the default folder of scratch.hpp). An eighth of the limit may be resident of these. Whoever reads them
 /// needs not know. Throws as read_vdvr, and ResourceError naming the folder where it has no room.
 VDVR_API VdvrFile read_large_vdvr(const std::filesystem::path& path, std::uint64_t max_memory_bytes,
                                   const std::filesystem::path& scratch, Altered altered = Altered::refuse);

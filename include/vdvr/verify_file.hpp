@@ -1,4 +1,4 @@
-// A file's whole promise held to its projections: seal, hash, certificate and field. What `vdvr verify` does.
+// A file's whole promise held to its projections: seal, hash, certificate and field. `vdvr verify` does this.
 #pragma once
 
 #include <cstdint>
@@ -21,8 +21,8 @@ VDVR_API VdvrFile read_large_certified(const std::filesystem::path& path, std::u
 
 /// read_certified for verify_file: altered samples stay in VdvrFile::altered, since they can be measured.
 /// Throws MismatchError for a broken seal over samples that are whole, since a certificate that is not the
-/// one written has nothing to compare with, for one that contradicts itself, and for a volume for comparison,
-/// which promises nothing.
+/// one written has nothing to compare with. Throws MismatchError also for a certificate that contradicts
+/// itself, and for a volume for comparison, which promises nothing.
 VDVR_API VdvrFile read_to_verify(const std::filesystem::path& path, std::uint64_t max_memory_bytes = 0);
 
 /// Throws MismatchError unless the certificate is of these projections.
