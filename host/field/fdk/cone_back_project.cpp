@@ -72,11 +72,11 @@ void copy_upsampled(opencl::State& state, Upsampler& upsampler, const UpsampledC
   for (std::size_t r = 0; r < rows.size(); ++r)
     rows[r] = table.first_row + static_cast<double>(r) / table.rate;
   const UpsampledSlab slab = upsampler(columns, rows, 0, 0, table.rate, table.first_view, table.views);
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int> kernel(state, "field/fdk/join_rows",
-                                                                                "join_rows");
-  const auto all = table.views * table.columns;
-  kernel({{count(table.row_stride), count(all), 1}, {64, 1, 1}}, table.values.buffer(), slab.values.buffer(),
-         to_int(all), to_int(table.rows), to_int(table.rate), to_int(table.row_stride / table.rate));
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int> kernel(
+      state, "field/fdk/join_rows", "join_rows", {{"VDVR_RATE", std::to_string(table.rate)}});
+  const std::int64_t all = table.views * table.columns, of_phase = table.row_stride / table.rate;
+  kernel({{count(of_phase), count(table.rate), count(all)}, {16, 1, 1}}, table.values.buffer(),
+         slab.values.buffer(), to_int(all), to_int(table.rows), to_int(of_phase));
   opencl::finish(state, "upsampled rows");  // before the slab goes
 }
 
