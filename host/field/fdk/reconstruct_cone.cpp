@@ -37,7 +37,8 @@ ConeMargins margins_of(const FilteredScan& scan, const Grid& grid) {
     columns = std::max(columns, 2 * kept_distance(grid) / view.pitch_u);
     rows = std::max(rows, 2 * kept_distance(grid) / view.pitch_v);
   }
-  return {static_cast<std::int64_t>(std::ceil(columns)) + 1, static_cast<std::int64_t>(std::ceil(rows)) + 1};
+  return {static_cast<std::int64_t>(std::ceil(columns)) + 1, static_cast<std::int64_t>(std::ceil(rows)) + 1,
+          planes_suit_vectors(scan, grid)};
 }
 
 // The planes of a slab that are kept of each column.

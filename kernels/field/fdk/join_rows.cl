@@ -6,7 +6,8 @@
 #error "VDVR_RATE must be set"
 #endif
 
-__kernel void join_rows(__global float* out, __global const float* in, int lines, int rows, int phase_stride) {
+__kernel void join_rows(__global float* out, __global const float* in, int lines, int rows,
+                        int phase_stride) {
   const int i = (int)get_global_id(0), phase = (int)get_global_id(1), line = (int)get_global_id(2);
   if (i >= phase_stride || phase >= VDVR_RATE || line >= lines) return;
   const int row = i * VDVR_RATE + phase;
