@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -264,8 +265,12 @@ void ConeTiles::launch(const Table& table, const ConePage& page, VdvrConeNodes s
 void ConeTiles::back_project(std::span<const ConePage> pages, const Progress& progress) {
   const std::int64_t views = scan_.geometry.views(), chunk = views_together_;
   const Blocks blocks(in_double_, lattice_.groups);
+  table_seconds_ = 0;
   for (std::int64_t first = 0; first < views; first += chunk) {
+    const auto start = std::chrono::steady_clock::now();
     const Table views_of_chunk = table(first, std::min(chunk, views - first));
+    opencl::finish(state_, "dense views");
+    table_seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     VdvrConeNodes shape{};
     shape.plane = count(columns_.count * column_stride_);
     shape.tile = count(side * side * lattice_.stride);

@@ -58,6 +58,8 @@ class ConeTiles {
   /// of eight lanes; and tables of all views. Memory: tables of some views, at most a quarter of what is
   /// left.
   void back_project(std::span<const ConePage> pages, const Progress& progress);
+  /// Seconds that the tables of the last call took.
+  [[nodiscard]] double table_seconds() const { return table_seconds_; }
   /// From now on without strips, as devices do whose work-items share caches: for tests.
   void take_no_strips() { in_runs_ = false; }
   [[nodiscard]] bool in_runs() const { return in_runs_; }
@@ -128,6 +130,7 @@ class ConeTiles {
   bool upright_ = true, in_double_ = true, in_runs_ = true;
   double sup_ = 0, largest_weight_ = 0;
   Vec3 band_{};
+  double table_seconds_ = 0;
   double row_step_ = 0;     // rows of the table from a node to the one above it
   double block_reach_ = 0;  // columns or rows of the table from a block's middle to its nodes
   std::array<std::vector<std::vector<ViewAtPart>>, 3> at_parts_;  // where filters along the axis fill
