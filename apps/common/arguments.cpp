@@ -69,8 +69,10 @@ std::uint64_t parse_bytes(const std::string& option_name, const std::string& tex
       digits.pop_back();
     }
   }
-  const double bytes = parse_number(option_name, digits) * factor;
-  if (!(bytes >= 1 && bytes < 0x1p62))
+  double number = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
+  const double bytes = number * factor;
+  if (error != std::errc() || end != digits.data() + digits.size() || !(bytes >= 1 && bytes < 0x1p62))
     throw InputError(fmt::format("{}: '{}' is not an amount of memory; write 512M or 2G", option_name, text));
   return static_cast<std::uint64_t>(bytes);
 }

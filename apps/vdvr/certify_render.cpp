@@ -207,7 +207,9 @@ CertifiedRender certify_render(const Arguments& args, const CommonOptions& commo
   const Scene& scene = source.scene();
   const std::string name = args.path("FILE").string(), show = args.text_or("show", "colour");
   if (!scene.certificate || !scene.verified)
-    throw InputError(fmt::format("{}: --certify needs a certified volume whose content was compared", name));
+    throw InputError(fmt::format(
+        "{}: --certify needs a certified volume whose content was compared; `vdvr build` makes one of a scan",
+        name));
   check_pixel(args, options);
   for (const auto& path : beside_picture(output, options.mode)) check_output(path, common.force, {});
   PictureRequest request = picture_request(args, options, covered_of(args, scene, progress));

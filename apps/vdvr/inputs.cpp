@@ -145,8 +145,13 @@ ProjectionSet load(const fs::path& path, const Arguments& args, const FieldOptio
   return scan;
 }
 
-ProjectionSet checked(ProjectionSet scan) {
-  for (auto& note : check_scan(scan)) scan.report.notes.push_back(std::move(note));
+ProjectionSet checked(ProjectionSet scan, const fs::path& path) {
+  try {
+    for (auto& note : check_scan(scan)) scan.report.notes.push_back(std::move(note));
+  } catch (InputError& e) {
+    e.add_context(path.string());
+    throw;
+  }
   return scan;
 }
 
@@ -161,7 +166,7 @@ ProjectionSet load_any_scan(const fs::path& path, const Arguments& args, const F
 ProjectionSet load_scan(const fs::path& path, const Arguments& args, const FieldOptions& field,
                         const Progress& progress, Understood* understood) {
   Understood own;
-  return checked(load(path, args, field, {}, {}, progress, understood ? *understood : own));
+  return checked(load(path, args, field, {}, {}, progress, understood ? *understood : own), path);
 }
 
 ScanOptions scan_options(const Arguments& args, const FieldOptions& field) {
@@ -179,7 +184,8 @@ ProjectionSet load_certified_scan(const fs::path& path, const Arguments& args, c
   ProjectionSet scan =
       checked(load(path, args, certificate.field,
                    geometry && geometry->cone && bare ? std::optional(Beam::cone) : std::nullopt, stored,
-                   progress, understood));
+                   progress, understood),
+              path);
   if (understood.stated != stored)
     throw MismatchError(fmt::format("{}: options state of the input: {}; the volume was built with: {}",
                                     path.string(), text_of(understood.stated), text_of(stored)));

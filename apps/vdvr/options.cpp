@@ -264,7 +264,8 @@ BuildOptions build_options(const Arguments& args) {
   if (const auto r = args.numbers("roi", 6)) {
     for (std::size_t a = 0; a < 3; ++a)
       if (!((*r)[a] < (*r)[a + 3]))
-        throw InputError(fmt::format("--roi: {} is not below {}", (*r)[a], (*r)[a + 3]));
+        throw InputError(fmt::format("--roi: {} is not below {} along {}: the lower corner comes first",
+                                     (*r)[a], (*r)[a + 3], "xyz"[a]));
     build.roi.emplace();
     std::copy(r->begin(), r->end(), build.roi->begin());
   }

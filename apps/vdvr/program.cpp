@@ -19,7 +19,8 @@ constexpr const char* purpose =
 void print_overview() {
   fmt::print("vdvr {}: {}\n\n", VDVR_VERSION, purpose);
   fmt::print(
-      "usage: vdvr COMMAND [options]\n       vdvr COMMAND --help | --help-all\n       vdvr --version\n       vdvr --man "
+      "usage: vdvr COMMAND [options]\n       vdvr COMMAND --help | --help-all\n       vdvr --version\n       "
+      "vdvr --man "
       "[COMMAND]\n"
       "       vdvr --completion bash\n\ncommands:\n");
   for (const Command& c : commands()) fmt::print("  {:<16} {}\n", c.name, c.purpose);

@@ -56,7 +56,8 @@ ParallelGeometry geometry_of(const io::RawScan& raw, const std::string& name) {
       throw FileError(fmt::format("{}: pitch {}; it must be positive", name, pitch));
   for (std::size_t k = 0; k < raw.theta_deg.size(); ++k) {
     if (!std::isfinite(raw.theta_deg[k]))
-      throw FileError(fmt::format("{}: angle {} is {}", name, k, raw.theta_deg[k]));
+      throw FileError(fmt::format("{}: angle {} is {}; correct it, or leave that view out by `views`", name,
+                                  k, raw.theta_deg[k]));
     g.theta_rad.push_back(raw.theta_deg[k] * (std::numbers::pi / 180));
   }
   io::require_radians(name, "angles", g.theta_rad, io::not_radians);

@@ -11,6 +11,8 @@
 #include <limits>
 #include <vector>
 
+#include "host/files/io/text_encoding.hpp"
+
 namespace vdvr {
 namespace {
 
@@ -66,6 +68,8 @@ std::optional<Problem> grid_problem(const MixedVolume& v) {
   }
   if (v.grid.unit.find('\0') != std::string::npos || v.grid.unit.size() > longest_unit)
     return at_grid(fmt::format("the unit has a zero byte or more than {} bytes", longest_unit));
+  if (utf8_of(v.grid.unit) != v.grid.unit)
+    return at_grid("the unit is no UTF-8, or begins with a byte order mark");
   return std::nullopt;
 }
 

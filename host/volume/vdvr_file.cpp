@@ -310,7 +310,9 @@ void read_step(const h5::Reader& file, const Contents& c, MixedVolume& v) {
 
 /// The certificate, or the record of a comparison; earlier versions kept that as a certificate which says so.
 Certificate read_certificate(const h5::Reader& file, const std::string& path, std::string& json) {
-  const bool record = file.has(kComparison) && !file.has(kCertificate);
+  const bool record = file.has(kComparison);
+  if (record && file.has(kCertificate))
+    file.refuse(kComparison, "stands beside a certificate, and only one of them can speak of the volume");
   const char* name = record ? kComparison : kCertificate;
   json = file.text(name, std::min(longest_certificate, file.file_bytes()));
   Certificate c;

@@ -444,6 +444,10 @@ BOOST_AUTO_TEST_CASE(a_missing_or_broken_certificate_is_refused) {
   BOOST_TEST(says(refusal_after(replace("/certificate", H5T_STD_U8LE, H5T_NATIVE_UINT8, {4},
                                         std::vector<std::uint8_t>(4))),
                   {"/certificate", "not a string"}));
+  BOOST_TEST(says(refusal_after([](hid_t file) {
+                    H5Lcopy(file, "/certificate", file, "/comparison", H5P_DEFAULT, H5P_DEFAULT);
+                  }),
+                  {"/comparison", "beside a certificate"}));
   // Rewritten by h5py, say: readable; whether it is true is for verify to find.
   BOOST_TEST(refusal_after(set_certificate(to_json(support::full_certificate()))) == "accepted");
 }
@@ -479,6 +483,7 @@ BOOST_AUTO_TEST_CASE(a_volume_the_reader_would_refuse_is_not_written) {
       },
       [](MixedVolume& m) { m.grid.spacing[0] = std::numeric_limits<double>::quiet_NaN(); },
       [](MixedVolume& m) { m.grid.unit = std::string("m\0m", 3); },
+      [](MixedVolume& m) { m.grid.unit = "\xb5m"; },  // Latin-1
       [](MixedVolume& m) { m.rate = 6; },
       [](MixedVolume& m) { m.base.f32[3] = std::numeric_limits<float>::infinity(); }};
   for (std::size_t i = 0; i < mistakes.size(); ++i) {

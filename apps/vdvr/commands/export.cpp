@@ -105,7 +105,8 @@ int export_command(Arguments& args) {
   check_volume_output(output, format, common.force, {path});
   if (args.has("sigma")) check_volume_output(sigma_path(output), format, common.force, {path});
   if (kind_of(path, args) != InputKind::certified)
-    throw InputError(fmt::format("{}: is not a certified volume", path.string()));
+    throw InputError(
+        fmt::format("{}: is not a certified volume; `vdvr build` makes one of a scan", path.string()));
 
   ProgressLine progress(args.who(), common.quiet);
   const VdvrFile file = open_certified(path, args, args.has("unverified"));

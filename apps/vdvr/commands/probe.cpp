@@ -54,7 +54,9 @@ std::vector<Vec3> read_points(const std::filesystem::path& path) {
     if (!line.empty() && line.back() == '\r') line.pop_back();
     return true;
   };
-  if (!file) throw FileError(fmt::format("{}: cannot be read", path.string()));
+  if (!file)
+    throw FileError(
+        fmt::format("{}: cannot be read; it must be a file of points, one x,y,z a line", path.string()));
   if (!next_line())
     throw FileError(fmt::format("{}: is empty; its first line is the header x,y,z", path.string()));
   if (line.rfind("\xEF\xBB\xBF", 0) == 0) line.erase(0, 3);
@@ -230,7 +232,7 @@ int probe_command(Arguments& args) {
            "defines the field of projections; " + path.string() + " has its own");
   }
   if (kind != InputKind::certified)
-    refuse(args, {"projections"}, path.string() + " is not a certified volume");
+    refuse(args, {"projections"}, path.string() + " is not a certified volume; leave it out");
   const std::vector<Vec3> points = read_points(points_path);
 
   ProgressLine progress(args.who(), common.quiet);

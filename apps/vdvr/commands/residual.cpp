@@ -150,7 +150,8 @@ int residual_command(Arguments& args) {
   const ResidualOptions options = rows_option(args);
   if (outputs.picture.empty()) refuse(args, {"picture-row"}, "is for the picture, which --picture asks for");
   if (kind_of(path, args) != InputKind::certified)
-    throw InputError(fmt::format("{}: is not a certified volume", path.string()));
+    throw InputError(
+        fmt::format("{}: is not a certified volume; `vdvr build` makes one of a scan", path.string()));
 
   ProgressLine progress(args.who(), common.quiet);
   const VdvrFile file = open_certified(path, args);

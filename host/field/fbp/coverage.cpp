@@ -245,7 +245,9 @@ Grid make_grid(const ParallelGeometry& geometry, const GridOptions& options) {
 }
 
 std::vector<std::string> check_scan(const ParallelGeometry& g) {
-  if (g.views() < 2) throw InputError(fmt::format("{} view(s); tomography needs at least 2", g.views()));
+  if (g.views() < 2)
+    throw InputError(fmt::format(
+        "{} view(s); tomography needs at least 2: look at `views`, and at the file's angles", g.views()));
   if (g.columns < 2 || g.rows < 1)
     throw InputError(fmt::format("a detector of {} columns x {} rows is too small", g.columns, g.rows));
   for (const double theta : g.theta_rad)

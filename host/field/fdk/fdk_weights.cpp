@@ -25,7 +25,8 @@ double degrees(double radians) { return radians * 180 / pi; }
 FdkWeights::FdkWeights(const ConeGeometry& cone, std::int64_t columns, std::int64_t rows)
     : columns_(columns), rows_(rows), redundancy_(cone.redundancy), arc_(source_arc(cone)) {
   if (cone.views.size() < 2)
-    throw InputError(fmt::format("{} view(s); tomography needs at least 2", cone.views.size()));
+    throw InputError(
+        fmt::format("{} view(s); tomography needs at least 2: look at `views`", cone.views.size()));
   if (columns < 2 || rows < 1)
     throw InputError(fmt::format("a detector of {} columns x {} rows is too small", columns, rows));
   std::vector<double> angles;

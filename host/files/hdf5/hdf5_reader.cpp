@@ -13,6 +13,12 @@
 namespace vdvr::io::hdf5 {
 namespace {
 
+/// Of what is there and does not open.
+std::string unreadable() {
+  return fmt::format("cannot be read: the file is damaged (HDF5: {}); copy it again from where it was made",
+                     reason());
+}
+
 /// Numbers of an attribute: more than this no file of ours has, and memory is taken for them.
 constexpr std::uint64_t most_attribute_values = 1 << 20;
 constexpr hsize_t most_attributes = 256;
@@ -56,7 +62,7 @@ Found require_attribute(const Reader& file, const Handle& parent, const std::str
                         const std::string& name, bool number, std::uint64_t count) {
   Found a = find_attribute(parent, name);
   if (!a.exists) file.refuse(shown, "is missing");
-  if (!a.id) file.refuse(shown, reason());
+  if (!a.id) file.refuse(shown, unreadable());
   if (number ? !a.is_number() : a.kind != H5T_STRING)
     file.refuse(shown, fmt::format("is {}, expected {}", a.type_text(), number ? "a number" : "a string"));
   if (a.count < 0 || static_cast<std::uint64_t>(a.count) != count || a.rank > 1)
@@ -129,10 +135,10 @@ bool Reader::hard_linked(const std::string& path) const {
   for (std::size_t end = path.find('/', 1);; end = path.find('/', end + 1)) {
     const std::string step = path.substr(0, end);
     const htri_t exists = H5Lexists(file_.id(), step.c_str(), H5P_DEFAULT);
-    if (exists < 0) refuse(step, reason());
+    if (exists < 0) refuse(step, unreadable());
     if (exists == 0) return false;
     H5L_info_t info{};
-    if (H5Lget_info(file_.id(), step.c_str(), &info, H5P_DEFAULT) < 0) refuse(step, reason());
+    if (H5Lget_info(file_.id(), step.c_str(), &info, H5P_DEFAULT) < 0) refuse(step, unreadable());
     if (info.type != H5L_TYPE_HARD)
       refuse(step, "is a soft or external link; only data inside the file is read");
     if (end == std::string::npos) return true;
@@ -148,7 +154,7 @@ Place Reader::locate(const std::string& path) const {
   Place place;
   if (path != "/" && !hard_linked(path)) return place;
   place.object = Handle(H5Oopen(file_.id(), path.c_str(), H5P_DEFAULT), H5Oclose);
-  if (!place.object) refuse(path, reason());
+  if (!place.object) refuse(path, unreadable());
   return place;
 }
 
@@ -181,7 +187,7 @@ std::vector<std::string> Reader::members(const std::string& group) const {
   };
   if (H5Literate(object.id(), H5_INDEX_NAME, H5_ITER_INC, nullptr, collect, &names) < 0 &&
       links_ == Links::hard)
-    refuse(group, reason());
+    refuse(group, unreadable());
   std::sort(names.begin(), names.end());
   return names;
 }
@@ -198,7 +204,7 @@ std::vector<std::int64_t> Reader::integers(const std::string& object, const std:
   const Found a = require_attribute(*this, open_object(object), shown, name, true, count);
   if (a.kind != H5T_INTEGER) refuse(shown, "is not an integer");
   std::vector<std::int64_t> values(count);
-  if (!read_numbers(a, values)) refuse(shown, reason());
+  if (!read_numbers(a, values)) refuse(shown, unreadable());
   return values;
 }
 
@@ -211,7 +217,7 @@ std::vector<double> Reader::reals(const std::string& object, const std::string& 
   const std::string shown = name_of(object, name);
   const Found a = require_attribute(*this, open_object(object), shown, name, true, count);
   std::vector<double> values(count);
-  if (!read_numbers(a, values)) refuse(shown, reason());
+  if (!read_numbers(a, values)) refuse(shown, unreadable());
   return values;
 }
 
@@ -226,7 +232,7 @@ std::string Reader::text_attribute(const std::string& object, const std::string&
 std::vector<Attribute> Reader::attributes(const std::string& object) const {
   const Handle parent = open_object(object);
   H5O_info_t info{};
-  if (H5Oget_info2(parent.id(), &info, H5O_INFO_NUM_ATTRS) < 0) refuse(object, reason());
+  if (H5Oget_info2(parent.id(), &info, H5O_INFO_NUM_ATTRS) < 0) refuse(object, unreadable());
   if (info.num_attrs > most_attributes)
     refuse(object, fmt::format("has {} attributes, more than {}", info.num_attrs, most_attributes));
   std::vector<std::string> names;
@@ -235,19 +241,19 @@ std::vector<Attribute> Reader::attributes(const std::string& object) const {
     return 0;
   };
   if (H5Aiterate2(parent.id(), H5_INDEX_NAME, H5_ITER_INC, nullptr, collect, &names) < 0)
-    refuse(object, reason());
+    refuse(object, unreadable());
   std::sort(names.begin(), names.end());
   std::vector<Attribute> all;
   for (const std::string& name : names) {
     const std::string shown = name_of(object, name);
     const Found a = find_attribute(parent, name);
-    if (!a.id) refuse(shown, reason());
+    if (!a.id) refuse(shown, unreadable());
     if (a.count < 0 || static_cast<std::uint64_t>(a.count) > most_attribute_values)
       refuse(shown, fmt::format("holds {} values", a.count));
     const auto count = static_cast<std::uint64_t>(a.count);
     const auto numbers = [&](auto zero) {
       std::vector<decltype(zero)> values(count, zero);
-      if (!read_numbers(a, values)) refuse(shown, reason());
+      if (!read_numbers(a, values)) refuse(shown, unreadable());
       all.push_back(attribute_of<decltype(zero)>(object, name, values));
     };
     if (a.kind == H5T_INTEGER) {

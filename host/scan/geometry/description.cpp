@@ -76,7 +76,8 @@ std::vector<Description> Description::members(const std::string& key, const std:
 
 void Description::require_known(const std::set<std::string>& known) const {
   for (const auto& [key, value] : json_.items())
-    if (!known.contains(key)) fail(fmt::format("member {} is unknown", quoted(key)));
+    if (!known.contains(key))
+      fail(fmt::format("member {} is unknown; there are: {}", quoted(key), fmt::join(known, ", ")));
 }
 
 void Description::fail(const std::string& what) const {
@@ -214,7 +215,9 @@ std::vector<std::string> Description::matches(const std::string& key) const {
     const auto found = matches(pattern, key);
     all.insert(all.end(), found.begin(), found.end());
   }
-  if (all.empty()) fail(fmt::format("{} matches no file", quoted(key)));
+  if (all.empty())
+    fail(fmt::format("{} is '{}', which matches no file in {}", quoted(key), fmt::join(texts(key), "', '"),
+                     folder().string()));
   return all;
 }
 

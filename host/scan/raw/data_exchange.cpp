@@ -35,7 +35,7 @@ RawScan open_data_exchange(const Reader& file, const std::string& group, const H
   scan.format = "data-exchange";
   const FrameStack data = open_frames(file, object, 0);
   if (data.data->shape.size() != 3)
-    throw FileError(fmt::format("{}: shape {}; three axes are needed", data.data->name,
+    throw FileError(fmt::format("{}: shape {}; three axes are needed, [angle][v][u]", data.data->name,
                                 shape_text(data.data->extents())));
   scan.rows = data.rows;
   scan.columns = data.columns;

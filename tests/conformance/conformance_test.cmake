@@ -1,0 +1,10 @@
+# Runs check.py: the program and the reader of examples/verify.py on the conformance kit. Skipped where h5py cannot be had.
+include("${CMAKE_CURRENT_LIST_DIR}/../support/h5py.cmake")
+find_h5py(conformance_test)
+if(NOT python)
+  return()
+endif()
+execute_process(COMMAND "${python}" "${CMAKE_CURRENT_LIST_DIR}/check.py" "${VDVR}" "${SOURCE}" RESULT_VARIABLE code)
+if(NOT code EQUAL 0)
+  message(FATAL_ERROR "check.py failed with ${code}")
+endif()

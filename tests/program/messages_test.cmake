@@ -1,0 +1,10 @@
+# What the program says of bad input. Skipped where h5py, which makes the bad files, cannot be had.
+include("${CMAKE_CURRENT_LIST_DIR}/../support/h5py.cmake")
+find_h5py(messages_test)
+if(NOT python)
+  return()
+endif()
+execute_process(COMMAND "${python}" "${CMAKE_CURRENT_LIST_DIR}/messages.py" "${VDVR}" RESULT_VARIABLE code)
+if(NOT code EQUAL 0)
+  message(FATAL_ERROR "messages.py failed with ${code}")
+endif()

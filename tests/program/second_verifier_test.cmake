@@ -1,0 +1,10 @@
+# Runs second_verifier.py: examples/verify.py on files of many kinds, and on forgeries. Skipped where h5py cannot be had.
+include("${CMAKE_CURRENT_LIST_DIR}/../support/h5py.cmake")
+find_h5py(second_verifier_test)
+if(NOT python)
+  return()
+endif()
+execute_process(COMMAND "${python}" "${CMAKE_CURRENT_LIST_DIR}/second_verifier.py" "${VDVR}" "${SOURCE}" RESULT_VARIABLE code)
+if(NOT code EQUAL 0)
+  message(FATAL_ERROR "second_verifier.py failed with ${code}")
+endif()
