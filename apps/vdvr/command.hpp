@@ -20,6 +20,7 @@ int build_command(Arguments& args);
 int verify_command(Arguments& args);
 int probe_command(Arguments& args);
 int residual_command(Arguments& args);
+int measure_command(Arguments& args);
 int render_command(Arguments& args);
 int export_command(Arguments& args);
 int convert_geometry_command(Arguments& args);

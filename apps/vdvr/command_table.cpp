@@ -88,6 +88,16 @@ std::vector<Command> commands_of_scans() {
 
 std::vector<Command> commands_of_volumes() {
   return {
+      {.name = "measure",
+       .usage = "FILE (--above C | --mean | ...)",
+       .purpose = "volumes, means, lines, components: intervals that hold for F",
+       .run = measure_command,
+       .main_options = {"above", "below", "mean", "histogram", "along", "components", "roi", "mask", "output",
+                        "help"},
+       .examples = {{"vdvr measure volume.vdvr --below 0.3", "the porosity, as an interval"},
+                    {"vdvr measure volume.vdvr --below 0.3 --components -o pores.csv",
+                     "pores that exist for sure, and those that may"},
+                    {"vdvr measure volume.vdvr --mean --ball 0,0,0,5", "the mean density in a ball"}}},
       {.name = "render",
        .usage = "FILE -o IMG.png",
        .purpose = "a picture, or a turntable of pictures",

@@ -8,6 +8,7 @@
 #include "vdvr/error.hpp"
 #include "vdvr/expert/certify.hpp"
 #include "vdvr/expert/reconstruct.hpp"
+#include "vdvr/expert/rows_to_verify.hpp"
 #include "vdvr/expert/volume_file.hpp"
 #include "vdvr/read_scan.hpp"
 #include "vdvr/verify_file.hpp"
@@ -173,23 +174,40 @@ ScanOptions scan_options(const Arguments& args, const FieldOptions& field) {
   return scan_options(args, field, {}, {});
 }
 
-ProjectionSet load_certified_scan(const fs::path& path, const Arguments& args, const Certificate& certificate,
-                                  const Progress& progress) {
+namespace {
+
+ProjectionSet load_as_stated(const fs::path& path, const Arguments& args, const Certificate& certificate,
+                             const FieldOptions& field, const Progress& progress) {
   const auto geometry = noted_geometry(certificate);
   const InputStatement stored = noted_input(certificate);
   std::error_code error;
   // Folders say it themselves; no other file is of cone beam.
   const bool bare = fs::is_regular_file(path, error) && path.filename() != "scan.json";
   Understood understood;
-  ProjectionSet scan =
-      checked(load(path, args, certificate.field,
-                   geometry && geometry->cone && bare ? std::optional(Beam::cone) : std::nullopt, stored,
-                   progress, understood),
-              path);
+  ProjectionSet scan = checked(
+      load(path, args, field, geometry && geometry->cone && bare ? std::optional(Beam::cone) : std::nullopt,
+           stored, progress, understood),
+      path);
   if (understood.stated != stored)
     throw MismatchError(fmt::format("{}: options state of the input: {}; the volume was built with: {}",
                                     path.string(), text_of(understood.stated), text_of(stored)));
   return scan;
+}
+
+}  // namespace
+
+ProjectionSet load_certified_scan(const fs::path& path, const Arguments& args, const Certificate& certificate,
+                                  const Progress& progress) {
+  return load_as_stated(path, args, certificate, certificate.field, progress);
+}
+
+ProjectionSet load_scan_to_verify(const fs::path& path, const Arguments& args, const Certificate& certificate,
+                                  const Progress& progress) {
+  FieldOptions measured = certificate.field;
+  measured.preparation.half_acquisition = false;
+  measured.preparation.padding = Padding::none;
+  return checked(
+      rows_to_verify(load_as_stated(path, args, certificate, measured, progress), certificate.field));
 }
 
 // --- the noise of scans ---

@@ -53,6 +53,9 @@ ProjectionSet load_any_scan(const std::filesystem::path& path, const Arguments& 
 /// something else.
 ProjectionSet load_certified_scan(const std::filesystem::path& path, const Arguments& args,
                                   const Certificate& certificate, const Progress& progress);
+/// The same, whose longer rows are made by verify's own means (rows_to_verify.hpp).
+ProjectionSet load_scan_to_verify(const std::filesystem::path& path, const Arguments& args,
+                                  const Certificate& certificate, const Progress& progress);
 
 // --- the noise of scans ---
 

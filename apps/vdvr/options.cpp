@@ -51,13 +51,18 @@ void add_field(Arguments& args) {
              "take stripes off sinograms, rings off slices; on: 3, and windows by the detector")
       .value("median", "N", "side of a square median window in pixels, odd")
       .value("gaussian", "SU,SV", "standard deviations of a blur in columns and rows")
-      .value("binning", "N", "columns and rows that become one pixel");
+      .value("binning", "N", "columns and rows that become one pixel")
+      .value("half-acquisition", "auto|on|off",
+             "a full turn about an axis off the middle: opposite views are rows of a wider detector (default "
+             "auto: as axis and arc say)")
+      .value("pad", "none|edge|mirror",
+             "of objects wider than the detector: how rows go on beyond it, tapering to zero (default none)");
 }
 
 namespace {
 
-const std::vector<std::string> preparation_names{"outliers", "phase",    "stripes",
-                                                 "median",   "gaussian", "binning"};
+const std::vector<std::string> preparation_names{"outliers", "phase",   "stripes",          "median",
+                                                 "gaussian", "binning", "half-acquisition", "pad"};
 
 // `count` numbers, or the first alone where `fewest` is 1.
 std::vector<double> list_of(const Arguments& args, const std::string& name, std::size_t fewest,
@@ -103,6 +108,9 @@ Preparation preparation_options(const Arguments& args) {
     p.gaussian = {values[0], values[1]};
   }
   p.binning = static_cast<int>(args.integer_or("binning", 1, 1, 1000));
+  const std::string half = args.choice("half-acquisition", "auto");
+  if (half != "auto") p.half_acquisition = half == "on";
+  p.padding = padding_of(args.choice("pad", "none")).value();
   check_preparation(p);
   return p;
 }

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/common/messages.hpp"
+#include "vdvr/expert/extend_rows.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/certify.hpp"
 #include "vdvr/expert/preparation.hpp"
@@ -35,9 +36,15 @@ Json grid_json(const Grid& g) {
   return {{"cells", g.cells}, {"origin", g.origin}, {"spacing", g.spacing}, {"unit", g.unit}};
 }
 
-Json geometry_json(const ParallelGeometry& g) {
+Json geometry_json(const ParallelGeometry& rows) {
+  const ParallelGeometry g = own_detector(rows);
   Json j = {{"views", g.views()},   {"rows", g.rows},     {"columns", g.columns}, {"pitch_u", g.pitch_u},
             {"pitch_v", g.pitch_v}, {"center", g.center}, {"unit", g.unit}};
+  if (rows.extension.before > 0 || rows.extension.after > 0)
+    j["longer_rows"] = {{"half_acquisition", rows.extension.half_acquisition.value_or(false)},
+                        {"pad", text_of(rows.extension.padding)},
+                        {"columns_before", rows.extension.before},
+                        {"columns_after", rows.extension.after}};
   if (!g.theta_rad.empty()) {
     constexpr double degrees = 57.29577951308232;
     j["first_angle_deg"] = g.theta_rad.front() * degrees;

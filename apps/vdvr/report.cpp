@@ -12,6 +12,7 @@
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/report_chart.hpp"
 #include "apps/vdvr/report_storage.hpp"
+#include "vdvr/expert/extend_rows.hpp"
 #include "vdvr/expert/preparation.hpp"
 
 namespace vdvr::cli {
@@ -373,7 +374,7 @@ std::string settings(const RunReport& run) {
 }
 
 std::string input(const RunReport& run) {
-  const ParallelGeometry& g = run.scan.geometry;
+  const ParallelGeometry g = own_detector(run.scan.geometry);
   const InputReport& r = run.scan.report;
   Pairs pairs;
   add(pairs, "scan", fmt::format("{} ({})", escaped(r.name), escaped(r.format)));

@@ -10,6 +10,8 @@
 #include "apps/common/messages.hpp"
 #include "apps/vdvr/cone.hpp"
 #include "apps/vdvr/output.hpp"
+#include "vdvr/expert/extend_rows.hpp"
+#include "vdvr/expert/preparation.hpp"
 
 namespace vdvr::cli {
 namespace {
@@ -130,16 +132,27 @@ void print_understood(const ProjectionSet& scan, const Understood& r) {
     fmt::print("  assumed      {}: {}; {} say otherwise\n", a.what, a.why, with_options(a.otherwise));
 }
 
+// The steps that made rows longer.
+Preparation extended_by(const RowExtension& e) {
+  Preparation p;
+  p.half_acquisition = e.half_acquisition;
+  p.padding = e.padding;
+  return p;
+}
+
 }  // namespace
 
 void print_scan(const ProjectionSet& scan, const Understood* understood) {
-  const ParallelGeometry& g = scan.geometry;
+  const ParallelGeometry g = own_detector(scan.geometry);
   const InputReport& r = scan.report;
   fmt::print("scan           {} ({}), {} views of {} x {} pixels, {}\n", r.name, r.format, g.views(),
              g.columns, g.rows, scan.cone ? "cone beam" : "parallel beam");
   if (understood) print_understood(scan, *understood);
   fmt::print("  pitch        {:.6g} x {:.6g} {}\n", g.pitch_u, g.pitch_v, g.unit);
   fmt::print("  centre       column {:.4f} ({})\n", g.center, r.center_source);
+  if (const RowExtension& e = scan.geometry.extension; e.before > 0 || e.after > 0)
+    fmt::print("  rows         longer: {} columns before, {} after, for {}\n", e.before, e.after,
+               text_of(extended_by(e)));
   if (scan.cone) print_cone(scan);
   if (r.dead_pixels != 0) fmt::print("  dead pixels  {} replaced\n", r.dead_pixels);
   if (r.air_background) fmt::print("  background   linear air background taken off\n");

@@ -72,7 +72,7 @@ JournalHead journal_head(const std::vector<Crew::Kind>& devices, const Projectio
       {"input sha256", scan.report.sha256},
       {"scan",
        fmt::format("{} views of {} x {}, pitch {},{}", g.views(), g.columns, g.rows, g.pitch_u, g.pitch_v)},
-      {"center", exact(plan.field.center.value_or(g.center))},
+      {"center", exact(stated_center(plan.field, g))},
       {"filter", fmt::format("{} to {}", text_of(plan.field.filter), plan.field.cutoff)},
       {"preparation", text_of(scan.report.preparation)},
       {"cells", fmt::format("{}x{}x{}", plan.grid.cells[0], plan.grid.cells[1], plan.grid.cells[2])},

@@ -87,6 +87,12 @@ std::string options_json(const Plan& plan, const CertifyOptions& options, const 
                    {"center", center_of(plan.field, geometry)},
                    {"unit", geometry.unit},
                    {"theta_rad", geometry.theta_rad}};
+  if (const RowExtension& e = geometry.extension; e.before > 0 || e.after > 0)
+    j["geometry"]["extension"] = {{"half_acquisition", e.half_acquisition.value_or(false)},
+                                  {"pad", text_of(e.padding)},
+                                  {"before", e.before},
+                                  {"after", e.after},
+                                  {"center", stated_center(plan.field, geometry)}};
   if (!scan.cone) return j.dump();
   nlohmann::ordered_json& cone = j["geometry"]["cone"];
   cone["redundancy"] = text_of(scan.cone->redundancy);
@@ -122,7 +128,7 @@ void refuse_empty_promise(const Certificate& c) {
 Grid grid_to_certify(const ProjectionSet& scan, const CertifyOptions& options) {
   check_options(options);
   FieldOptions field = options.field;
-  field.center = center_of(field, scan.geometry);
+  field.center = stated_center(field, scan.geometry);
   Grid grid = certified_grid(scan, field, options.grid);
   if (is_cropped(options))
     grid = grid_of_region(scan, field, *options.build.roi, grid, options.plan.granularity);
@@ -133,7 +139,7 @@ Plan make_plan(Device& device, const ProjectionSet& scan, const Tolerance& toler
                const CertifyOptions& options, const Progress& progress) {
   const Grid grid = grid_to_certify(scan, options);
   FieldOptions field = options.field;
-  field.center = center_of(field, scan.geometry);
+  field.center = stated_center(field, scan.geometry);
   Plan plan = make_plan(device, scan, grid, field, options.rates, tolerance, options.plan, progress);
   if (is_cropped(options)) plan.notes.emplace_back(of_region_note);
   return plan;

@@ -9,6 +9,7 @@
 #include "host/certify/gold/worst_node.hpp"
 #include "host/volume/bricks.hpp"
 #include "host/volume/covered_range.hpp"
+#include "vdvr/expert/extend_rows.hpp"
 #include "vdvr/expert/certified_region.hpp"
 #include "vdvr/expert/trust.hpp"
 
@@ -81,7 +82,7 @@ Certificate fill_certificate(const Inputs& in, Device& device, const ProjectionS
   c.rates = plan.rates;
   c.bounds = plan.bounds;
   c.field = plan.field;
-  c.field.center = plan.field.center.value_or(scan.geometry.center);
+  c.field.center = stated_center(plan.field, scan.geometry);
   c.field.preparation = scan.report.preparation;
   c.padding = filtered.fft_length;
   c.window = options.window;
@@ -94,7 +95,7 @@ Certificate fill_certificate(const Inputs& in, Device& device, const ProjectionS
   c.not_covered_rule = kNotCoveredRule;
   c.input_name = scan.report.name;
   c.input_sha256 = scan.report.sha256;
-  c.input_shape = {scan.geometry.views(), scan.geometry.rows, scan.geometry.columns};
+  c.input_shape = {scan.geometry.views(), scan.geometry.rows, own_detector(scan.geometry).columns};
   c.input_angles = scan.geometry.views();
   c.device = device.info().name;
   c.driver = device.info().driver;

@@ -163,6 +163,24 @@ std::map<int, Stratum> strata_of(const std::vector<std::uint8_t>& near,
   return strata;
 }
 
+// The column of blocks that holds a place, in shares of the grid.
+void choose_column(std::vector<std::uint8_t>& chosen, const Index3& n, const Index3& block,
+                   const std::array<double, 2>& place) {
+  const auto first = [&](std::size_t a) {
+    return std::min(static_cast<std::int64_t>(place[a] * static_cast<double>(n[a])), n[a] - 1) / block[a] *
+           block[a];
+  };
+  for (std::int64_t y = first(1); y < std::min(n[1], first(1) + block[1]); ++y)
+    for (std::int64_t x = first(0); x < std::min(n[0], first(0) + block[0]); ++x)
+      chosen[at(y * n[0] + x)] = 1;
+}
+
+std::vector<std::uint8_t> bricks_of_columns(std::vector<std::uint8_t> near,
+                                            const std::vector<std::uint8_t>& chosen) {
+  for (std::size_t i = 0; i < near.size(); ++i) near[i] = near[i] && chosen[i % chosen.size()];
+  return near;
+}
+
 }  // namespace
 
 std::vector<std::uint8_t> bricks_to_look_at(GoldStream& stream, const ParallelGeometry& geometry) {
@@ -184,16 +202,18 @@ std::vector<std::uint8_t> bricks_to_look_at(GoldStream& stream, const ParallelGe
     // Turning by the golden angle spreads points evenly over a disc.
     const double r = 0.5 * std::sqrt((static_cast<double>(i) + 0.5) / static_cast<double>(wanted)),
                  angle = static_cast<double>(i) * std::numbers::pi * (3 - std::sqrt(5.0));
-    const auto first = [&](std::size_t a, double f) {
-      return std::min(static_cast<std::int64_t>(f * static_cast<double>(n[a])), n[a] - 1) / block[a] *
-             block[a];
-    };
-    const std::int64_t x0 = first(0, 0.5 + r * std::cos(angle)), y0 = first(1, 0.5 + r * std::sin(angle));
-    for (std::int64_t y = y0; y < std::min(n[1], y0 + block[1]); ++y)
-      for (std::int64_t x = x0; x < std::min(n[0], x0 + block[0]); ++x) chosen[at(y * n[0] + x)] = 1;
+    choose_column(chosen, n, block, {0.5 + r * std::cos(angle), 0.5 + r * std::sin(angle)});
   }
-  for (std::size_t i = 0; i < near.size(); ++i) near[i] = near[i] && chosen[i % chosen.size()];
-  return near;
+  return bricks_of_columns(std::move(near), chosen);
+}
+
+std::vector<std::uint8_t> bricks_on_radius(GoldStream& stream) {
+  const GoldSettings& settings = stream.settings();
+  const Index3 n = Bricks(settings.grid, settings.granularity).along(), block = stream.block_bricks();
+  std::vector<std::uint8_t> chosen(at(n[0] * n[1]), 0);
+  for (std::int64_t x = n[0] / 2; x < n[0]; ++x)
+    choose_column(chosen, n, block, {(static_cast<double>(x) + 0.5) / static_cast<double>(n[0]), 0.5});
+  return bricks_of_columns(stream.bricks_near_coverage(), chosen);
 }
 
 // A brick that was classified to see what becomes of it.

@@ -24,6 +24,9 @@ struct BuildForecast {
 /// Bricks that stand for all: those near the coverage, or of large grids those of some columns of blocks from
 /// the lowest to the highest, at places that stand for equal areas of the covered disc.
 std::vector<std::uint8_t> bricks_to_look_at(GoldStream& stream, const ParallelGeometry& geometry);
+/// Those of the columns of blocks from the axis outwards along x: neighbours read the same kept nodes, which
+/// take several times as long of cone beam.
+std::vector<std::uint8_t> bricks_on_radius(GoldStream& stream);
 
 /// Of what plans look at, forecasts builds of different tolerances. Keeps the prepared scan, in whose units
 /// it computes; what it takes and gives is in world units.

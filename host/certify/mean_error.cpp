@@ -15,7 +15,7 @@ namespace vdvr {
 namespace {
 
 // Along x and y, and along z, as far as samples of the volume are not further apart than the points.
-constexpr double most_across = 64, most_planes = 6;
+constexpr double most_across = 48, most_planes = 12;
 // Of fewer a mean says nothing.
 constexpr std::int64_t least_points = 100;
 
@@ -28,7 +28,7 @@ struct PointsAlong {
 PointsAlong points_along(double low, double high, double spacing, double most) {
   const double apart = std::max(1.0, std::floor((high - low) / (most * spacing)));
   PointsAlong p;
-  p.step = spacing * (apart + 1 - std::numbers::phi);
+  p.step = spacing * (apart + 2 - std::numbers::phi);
   p.first = low + p.step / 3;
   p.count = std::max<std::int64_t>(2, static_cast<std::int64_t>((high - p.first) / p.step) + 1);
   return p;
@@ -69,7 +69,9 @@ Grid points_in(const Grid& grid, const Certificate& c) {
 std::optional<MeanError> mean_error(Device& device, const ProjectionSet& scan, const MixedVolume& volume,
                                     const Certificate& c, const Progress& progress) {
   const Grid points = points_in(volume.grid, c);
-  const ReconstructOptions exact{c.field, 16, scan.cone ? Interpolation::linear : Interpolation::cubic};
+  // Linear interpolation at 8x errs by a hundredth of sigma, and takes a quarter of what tables at 16x take.
+  const ReconstructOptions parallel{c.field, 16, Interpolation::cubic}, cone{c.field, 8};
+  const ReconstructOptions& exact = scan.cone ? cone : parallel;
   const Volume field = reconstruct(device, scan, points, exact, progress);
   const CertifiedRegion region(scan, c.field);
   const Index3 n = points.samples(), bricks = volume.bricks();

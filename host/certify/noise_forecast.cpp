@@ -78,7 +78,9 @@ BrickSigma sigma_of_plan(Device& device, const ProjectionSet& scan, const Plan& 
 
 std::vector<SigmaForecast> forecast_in_sigma(const Plan& plan, const BrickSigma& sigma,
                                              std::span<const double> multiples) {
-  if (!plan.forecaster || plan.estimated) return {};
+  // Of parallel beam an estimate is one of rows, or bounded by some views.
+  const bool of_cone = plan.prepared && !plan.prepared->filtered.views.empty();
+  if (!plan.forecaster || (plan.estimated && !of_cone)) return {};
   std::vector<SigmaForecast> out;
   for (const double multiple : multiples) {
     NodeTolerance tolerance(0, sigma.of_brick);
@@ -100,7 +102,7 @@ PlanInSigma make_plan_in_sigma(Device& device, const ProjectionSet& scan, double
   if (!(multiple > 0) || !std::isfinite(multiple))
     throw InputError(fmt::format("a tolerance of {} sigma must be positive and finite", multiple));
   FieldOptions field = options.field;
-  field.center = center_of(field, scan.geometry);
+  field.center = stated_center(field, scan.geometry);
   const Grid grid = grid_to_certify(scan, options);
   const int granularity = fitting_granularity(options.plan.granularity, grid);
   PlanInSigma out;

@@ -23,6 +23,7 @@
 #include "host/certify/gold/prepared_scan.hpp"
 #include "host/certify/plan_parts.hpp"
 #include "host/field/fbp/reconstruct.hpp"
+#include "host/field/fdk/reconstruct_cone.hpp"
 #include "host/scan/row_window.hpp"
 #include "host/volume/bricks.hpp"
 #include "host/volume/covered_range.hpp"
@@ -151,7 +152,7 @@ class Planner {
     ProjectionSet used;
     used.geometry = scan.geometry;
     used.cone = scan.cone;
-    if (field.center && !scan.cone) used.geometry.center = *field.center;
+    if (!scan.cone) used.geometry.center = center_of(field, scan.geometry);
     plan_.notes = check_scan(used);
     plan_.grid = grid;
     plan_.field = field;
@@ -166,8 +167,9 @@ class Planner {
 
   Plan make(const RateOptions& wanted, const Tolerance& tolerance) {
     const std::vector<Rates> all = candidates(wanted, is_cone());
-    if (is_cone()) take_reference(all.front());
-    else reconstruct_reference();
+    if (!is_cone()) reconstruct_reference();
+    else if (estimates_base()) estimate_reference();
+    else take_reference(all.front());
     look_at_reference();
     set_epsilon(plan_, tolerance,
                 plan_.settings.comparison.epsilon_of_max
@@ -210,8 +212,9 @@ class Planner {
     if (looked_at_.empty()) {
       looked_at_ = gold.fine().bricks_near_coverage();
       if (plan_.settings.forecast) {
-        looked_at_ =
-            bricks_to_look_at(gold.coarse() ? *gold.coarse() : gold.fine(), prepared_->filtered.geometry);
+        GoldStream& first = gold.coarse() ? *gold.coarse() : gold.fine();
+        looked_at_ = estimates_base() ? bricks_on_radius(first)
+                                      : bricks_to_look_at(first, prepared_->filtered.geometry);
         gold.fine().prepare(looked_at_, GoldStream::For::samples, {});
       }
     }
@@ -234,6 +237,18 @@ class Planner {
                               progress_);
   }
 
+  // Of estimates from linear interpolation at 4x: gold is then kept for what is looked at, not for all.
+  void estimate_reference() {
+    WholeVolume whole(plan_.grid);
+    StageWatch watch(nullptr);
+    back_project_views(state_, prepared_->filtered, plan_.grid, 4, 2, whole.planes(), progress_, watch);
+    plan_.base = whole.take();
+    plan_.estimated = true;
+    plan_.notes.emplace_back(
+        "estimated: the range from samples of linear interpolation at 4x, the bounds and what is foreseen "
+        "from columns of the grid between its axis and its edge");
+  }
+
   void look_at_reference() {
     check_densities(largest_magnitude(plan_.base.samples), units_);
     const CoveredRange range = covered_range(plan_.base, *coverage_);
@@ -247,6 +262,9 @@ class Planner {
   }
 
   [[nodiscard]] bool is_cone() const { return !prepared_->filtered.views.empty(); }
+  [[nodiscard]] bool estimates_base() const {
+    return is_cone() && plan_.settings.estimate && plan_.settings.forecast;
+  }
   [[nodiscard]] bool grid_only() const { return plan_.settings.comparison.terms == Terms::grid; }
   [[nodiscard]] GoldSettings settings_at(const Rates& r) const { return gold_settings(plan_, r, is_cone()); }
 
@@ -302,12 +320,16 @@ class Planner {
     const auto size = [](const std::vector<std::uint8_t>& bricks) {
       return static_cast<double>(std::count(bricks.begin(), bricks.end(), 1));
     };
-    const double fitting = seconds_of([&] {
+    // What gold takes that is kept is foreseen by itself.
+    const KeptGold& kept = gold.fine().source()->kept;
+    const double before = kept.prepare_seconds();
+    const double with_gold = seconds_of([&] {
       if (plan_.settings.comparison.coefficients == Coefficients::midrange)
         fit_base_samples(state_, prepared_->filtered, prepared_->sups, settings_at(plan_.rates), looked_at,
                          stored, {}, source_at(plan_.rates));
     });
-    const double all = size(gold.fine().bricks_near_coverage());
+    const double fitting = std::max(0.0, with_gold - (kept.prepare_seconds() - before)),
+                 all = size(gold.fine().bricks_near_coverage());
     plan_.forecaster = std::make_shared<Forecaster>(prepared_, settings_at(plan_.rates), plan_.base,
                                                     std::move(stored), looked_at);
     const BuildForecast build = plan_.forecaster->forecast(to_world(everywhere() - t.arithmetic, units_));
@@ -315,7 +337,7 @@ class Planner {
     const double probing = seconds_of([&] { probe_filters(device_); });  // as build will
     plan_.seconds_of_rows = preparation_ + build.kept_seconds;
     plan_.seconds = preparation_ + fitting * all / std::max(1.0, size(looked_at)) + build.seconds + probing;
-    forecast_memory(build, gold.fine().source()->kept);
+    forecast_memory(build, kept);
   }
 
   // Gold that is kept; the base samples, fitted, rounded and on the device; tiles before and after closing
@@ -380,7 +402,7 @@ Plan of_all_rows(Plan plan, const RowWindow& window, const ProjectionSet& scan, 
   for (const std::int64_t cells : grid.cells)
     plan.gold_samples *= static_cast<std::uint64_t>(cells * plan.rates.gold + 1);
   ParallelGeometry used = g;
-  if (plan.field.center) used.center = *plan.field.center;
+  used.center = center_of(plan.field, g);
   plan.not_covered_count = count_not_covered(grid, Coverage(used));
   plan.not_covered_fraction =
       static_cast<double>(plan.not_covered_count) / static_cast<double>(grid.sample_count());

@@ -11,6 +11,7 @@
 #include "host/picture/canvas.hpp"
 #include "host/picture/text.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/extend_rows.hpp"
 #include "vdvr/expert/reconstruct.hpp"
 
 namespace vdvr {
@@ -39,10 +40,9 @@ double arc_of(const ParallelGeometry& g) {
   return *high - *low;
 }
 
-// As check_scan() tells one.
-bool is_half_acquisition(const ParallelGeometry& g, double center) {
-  const double below = center + 0.5, above = static_cast<double>(g.columns) - 0.5 - center;
-  return arc_of(g) > 1.5 * pi && std::min(below, above) < 0.5 * std::max(below, above);
+bool is_half_acquisition(ParallelGeometry g, double center) {
+  g.center = center;
+  return looks_half_acquired(g);
 }
 
 double linear_at(const float* row, std::int64_t columns, double at) {

@@ -22,6 +22,7 @@
 #include "host/scan/scan_report.hpp"
 #include "host/scan/values.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/extend_rows.hpp"
 #include "vdvr/expert/find_center.hpp"
 #include "vdvr/expert/hash.hpp"
 #include "vdvr/expert/output_file.hpp"
@@ -253,6 +254,21 @@ void choose_center(const fs::path& path, const io::RawScan& raw, const ScanOptio
   require_on_detector(path, g.center, g.columns, options);
 }
 
+void extend(const fs::path& path, const io::RawScan& raw, const ScanOptions& options, ProjectionSet& scan,
+            Understood& understood) {
+  Preparation wanted = options.preparation;
+  if (!wanted.half_acquisition && !raw.cone) wanted.half_acquisition = raw.half_acquisition;
+  try {
+    const std::string recognised = extend_rows(scan, wanted, options.max_memory_bytes, options.scratch);
+    if (recognised.empty()) return;
+    understood.warnings.push_back(recognised);
+    scan.report.notes.insert(scan.report.notes.begin(), recognised);
+  } catch (InputError& e) {
+    e.add_context(path.string());
+    throw;
+  }
+}
+
 enum class Wanted { all, flats_and_darks };
 
 // What comes from the files, and nothing kept.
@@ -319,6 +335,7 @@ ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const
   scan.report.preparation = for_columns(options.preparation, raw.columns);
   prepare_scan(scan, scan.report.preparation, options.max_memory_bytes, progress);
   if (!raw.cone) choose_center(path, raw, options, scan);
+  extend(path, raw, options, scan, understood);
   return scan;
 }
 

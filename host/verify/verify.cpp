@@ -375,7 +375,7 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
   opencl::State& state = device.state();
   require_trusted(device, "verifying a certificate");
   ParallelGeometry used = scan.geometry;
-  if (stored.field.center) used.center = *stored.field.center;
+  used.center = center_of(stored.field, used);
   check_scan(used);
   // Weights at most double the columns of a displaced detector.
   const std::uint64_t padded = scan.cone && scan.cone->redundancy == Redundancy::displaced ? 2 : 1;

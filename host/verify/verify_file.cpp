@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "vdvr/expert/extend_rows.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/preparation.hpp"
 
@@ -50,8 +51,8 @@ void check_input(const ProjectionSet& scan, const Certificate& c) {
   throw MismatchError(fmt::format(
       "these are other projections: found {} of {} x {} x {} (views, rows, columns), sha256 {}; the volume "
       "was built from {} of {} with sha256 {}",
-      scan.report.name, scan.geometry.views(), scan.geometry.rows, scan.geometry.columns, scan.report.sha256,
-      c.input_name, fmt::join(c.input_shape, " x "), c.input_sha256));
+      scan.report.name, scan.geometry.views(), scan.geometry.rows, own_detector(scan.geometry).columns,
+      scan.report.sha256, c.input_name, fmt::join(c.input_shape, " x "), c.input_sha256));
 }
 
 FileVerification verify_file(Device& device, const VdvrFile& file, const ProjectionSet& scan,

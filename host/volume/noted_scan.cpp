@@ -11,6 +11,22 @@
 
 namespace vdvr {
 
+namespace {
+
+RowExtension extension_of(const nlohmann::json& e) {
+  RowExtension out;
+  if (e.at("half_acquisition").get<bool>()) out.half_acquisition = true;
+  const auto padding = padding_of(e.at("pad").get<std::string>());
+  if (!padding) throw FileError("certificate, options.geometry.extension: an unknown padding");
+  out.padding = *padding;
+  out.before = e.at("before").get<std::int64_t>();
+  out.after = e.at("after").get<std::int64_t>();
+  out.center = e.at("center").get<double>();
+  return out;
+}
+
+}  // namespace
+
 std::optional<ProjectionSet> noted_geometry(const Certificate& certificate) {
   const auto options = nlohmann::json::parse(certificate.options_json, nullptr, false);
   if (!options.is_object() || !options.contains("geometry")) return std::nullopt;
@@ -25,6 +41,7 @@ std::optional<ProjectionSet> noted_geometry(const Certificate& certificate) {
     geometry.center = g.at("center").get<double>();
     geometry.unit = g.at("unit").get<std::string>();
     geometry.theta_rad = g.at("theta_rad").get<std::vector<double>>();
+    if (g.contains("extension")) geometry.extension = extension_of(g.at("extension"));
     if (g.contains("cone")) {
       const auto& cone = g.at("cone");
       const auto redundancy = redundancy_of(cone.at("redundancy").get<std::string>());

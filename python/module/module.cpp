@@ -16,4 +16,5 @@ NB_MODULE(_core, m) {
   vdvr::python::add_viewers(m);
   vdvr::python::add_files(m);
   vdvr::python::add_program(m);
+  vdvr::python::add_measures(m);
 }

@@ -13,5 +13,6 @@ void add_certified_pictures(nanobind::module_& m);
 void add_viewers(nanobind::module_& m);
 void add_files(nanobind::module_& m);
 void add_program(nanobind::module_& m);
+void add_measures(nanobind::module_& m);
 
 }  // namespace vdvr::python

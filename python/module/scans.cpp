@@ -21,6 +21,7 @@
 #include "parts.hpp"
 #include "vdvr/device.hpp"
 #include "vdvr/expert/certify.hpp"
+#include "vdvr/expert/extend_rows.hpp"
 #include "vdvr/expert/find_center.hpp"
 #include "vdvr/expert/preparation.hpp"
 #include "vdvr/expert/reconstruct.hpp"
@@ -56,7 +57,14 @@ std::shared_ptr<ProjectionSet> scan_of(const Projections& array, ArrayScan descr
   return scan;
 }
 
-nb::object data_of(const std::shared_ptr<ProjectionSet>& scan) {
+// Rows that were made longer are given as they were measured.
+std::shared_ptr<ProjectionSet> measured(const std::shared_ptr<ProjectionSet>& scan) {
+  const RowExtension& e = scan->geometry.extension;
+  return e.before == 0 && e.after == 0 ? scan : std::make_shared<ProjectionSet>(own_rows(*scan));
+}
+
+nb::object data_of(const std::shared_ptr<ProjectionSet>& of) {
+  const std::shared_ptr<ProjectionSet> scan = measured(of);
   const ParallelGeometry& g = scan->geometry;
   const std::size_t shape[3]{static_cast<std::size_t>(g.views()), static_cast<std::size_t>(g.rows),
                              static_cast<std::size_t>(g.columns)};
@@ -151,6 +159,10 @@ void add_geometry(nb::module_& m) {
       .def_rw("ratio", &Stripes::ratio)
       .def_rw("large", &Stripes::large)
       .def_rw("small", &Stripes::small);
+  nb::enum_<Padding>(m, "Padding")
+      .value("none", Padding::none)
+      .value("edge", Padding::edge)
+      .value("mirror", Padding::mirror);
   nb::class_<Preparation>(m, "Preparation")
       .def(nb::init<>())
       .def_rw("outliers", &Preparation::outliers)
@@ -159,6 +171,8 @@ void add_geometry(nb::module_& m) {
       .def_rw("median", &Preparation::median)
       .def_rw("gaussian", &Preparation::gaussian)
       .def_rw("binning", &Preparation::binning)
+      .def_rw("half_acquisition", &Preparation::half_acquisition)
+      .def_rw("padding", &Preparation::padding)
       .def("__str__", [](const Preparation& p) { return text_of(p); });
 }
 
@@ -198,14 +212,16 @@ void add_projections(nb::module_& m) {
       .def(nb::init<>())
       .def_rw("angles_deg", &ArrayScan::angles_deg)
       .def_rw("center", &ArrayScan::center)
+      .def_rw("half_acquisition", &ArrayScan::half_acquisition)
+      .def_rw("padding", &ArrayScan::padding)
       .def_rw("pitch_u", &ArrayScan::pitch_u)
       .def_rw("pitch_v", &ArrayScan::pitch_v)
       .def_rw("unit", &ArrayScan::unit)
       .def_rw("name", &ArrayScan::name);
   nb::class_<ProjectionSet>(m, "ProjectionSet")
-      .def_prop_ro("columns", [](const ProjectionSet& s) { return s.geometry.columns; })
+      .def_prop_ro("columns", [](const ProjectionSet& s) { return own_detector(s.geometry).columns; })
       .def_prop_ro("rows", [](const ProjectionSet& s) { return s.geometry.rows; })
-      .def_prop_ro("center", [](const ProjectionSet& s) { return s.geometry.center; })
+      .def_prop_ro("center", [](const ProjectionSet& s) { return own_detector(s.geometry).center; })
       .def_prop_ro("pitch",
                    [](const ProjectionSet& s) {
                      return std::array{s.geometry.pitch_u, s.geometry.pitch_v};
@@ -239,7 +255,7 @@ void add_projections(nb::module_& m) {
       [](const std::filesystem::path& path, const ProjectionSet& scan) {
         run_long(nb::none(), [&](const Progress&) {
           const std::lock_guard turn(hdf5_turn());
-          write_data_exchange(path, scan);
+          write_data_exchange(path, own_rows(scan));
         });
       },
       "path"_a, "scan"_a);
@@ -301,7 +317,7 @@ void add_projections(nb::module_& m) {
       "find_center",
       [](const ProjectionSet& scan) {
         std::optional<CenterEstimate> found;
-        run_long(nb::none(), [&](const Progress&) { found = find_center(scan); });
+        run_long(nb::none(), [&](const Progress&) { found = find_center(own_rows(scan)); });
         return found;
       },
       "scan"_a);

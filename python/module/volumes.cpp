@@ -23,6 +23,8 @@
 #include "vdvr/expert/export_vtk.hpp"
 #include "vdvr/expert/framing.hpp"
 #include "vdvr/expert/journal.hpp"
+#include "vdvr/expert/rows_to_verify.hpp"
+#include "vdvr/read_scan.hpp"
 #include "vdvr/verify_file.hpp"
 
 namespace nb = nanobind;
@@ -86,19 +88,41 @@ Held open(const std::filesystem::path& path, std::uint64_t max_memory_bytes, boo
   return held;
 }
 
+/// Rows that were made longer are made so once more, by verify's own means, where the scan's file is known.
+FileVerification verified(Device& device, const VdvrFile& file, const ProjectionSet& scan,
+                          const std::optional<ScanSource>& source, const VerifyOptions& options,
+                          const Progress& report) {
+  const RowExtension& e = scan.geometry.extension;
+  if (!source || (e.before == 0 && e.after == 0)) return verify_file(device, file, scan, options, report);
+  check_input(scan, file.certificate);
+  ScanOptions measured = source->how;
+  measured.preparation.half_acquisition = false;
+  measured.preparation.padding = Padding::none;
+  ProjectionSet rows;
+  {
+    const std::lock_guard turn(hdf5_turn());
+    rows = read_scan(source->path, measured, report);
+  }
+  return verify_file(device, file, rows_to_verify(std::move(rows), file.certificate.field), options, report);
+}
+
 FileVerification verify_held(Device& device, HeldVolume& held, const ProjectionSet& scan,
-                             const VerifyOptions& options, nb::handle progress) {
+                             const std::optional<ScanSource>& source, const VerifyOptions& options,
+                             nb::handle progress) {
   FileVerification result;
-  run_long(progress,
-           [&](const Progress& report) { result = verify_file(device, held.file(), scan, options, report); });
+  run_long(progress, [&](const Progress& report) {
+    result = verified(device, held.file(), scan, source, options, report);
+  });
   return result;
 }
 
 FileVerification verify_path(Device& device, const std::filesystem::path& path, const ProjectionSet& scan,
-                             const VerifyOptions& options, nb::handle progress) {
+                             const std::optional<ScanSource>& source, const VerifyOptions& options,
+                             nb::handle progress) {
   FileVerification result;
-  run_long(progress,
-           [&](const Progress& report) { result = verify_file(device, path, scan, options, report); });
+  run_long(progress, [&](const Progress& report) {
+    result = verified(device, read_to_verify(path), scan, source, options, report);
+  });
   return result;
 }
 
@@ -229,8 +253,10 @@ void add_verification(nb::module_& m) {
           "differences", [](const FileVerification& v) { return v.measured.differences; },
           "What the certificate says and what was computed instead, a line each.")
       .def("__bool__", [](const FileVerification& v) { return v.holds; });
-  m.def("verify_held", &verify_held, "device"_a, "volume"_a, "scan"_a, "options"_a, "progress"_a.none());
-  m.def("verify_path", &verify_path, "device"_a, "path"_a, "scan"_a, "options"_a, "progress"_a.none());
+  m.def("verify_held", &verify_held, "device"_a, "volume"_a, "scan"_a, "source"_a.none(), "options"_a,
+        "progress"_a.none());
+  m.def("verify_path", &verify_path, "device"_a, "path"_a, "scan"_a, "source"_a.none(), "options"_a,
+        "progress"_a.none());
 }
 
 }  // namespace

@@ -210,7 +210,7 @@ def verify(
     options.exhaustive = exhaustive
     where: Any = path_or_volume(volume)
     work = _core.verify_held if isinstance(where, _core.HeldVolume) else _core.verify_path
-    return work(open_device(device), where, _checked(scan), options, progress)
+    return work(open_device(device), where, _checked(scan), scan._source, options, progress)
 
 
 def verify_picture(

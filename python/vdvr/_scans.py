@@ -50,6 +50,9 @@ class Scan:
     pitch : width of a column, or (width, height) of a pixel, in `unit`.
     unit : of length; densities are per `unit`.
     line_integrals : says that whole numbers are line integrals, and not counts.
+    half_acquisition : a full turn about an axis off the middle, whose opposite views are rows of a wider detector;
+        by default as axis and arc say, and `notes` tell.
+    pad : "edge" or "mirror": how rows of objects wider than the detector go on beyond it, tapering to zero.
 
     Raises
     ------
@@ -71,6 +74,8 @@ class Scan:
         unit: str = "pixel",
         name: str = "array",
         line_integrals: bool = False,
+        half_acquisition: Optional[bool] = None,
+        pad: str = "none",
     ) -> None:
         described = _core.ArrayScan()
         described.angles_deg = [float(a) for a in np.asarray(angles_deg, dtype=np.float64).ravel()]
@@ -78,6 +83,8 @@ class Scan:
         pitches = (pitch, pitch) if isinstance(pitch, (int, float)) else numbers(pitch, 2, "pitch")
         described.pitch_u, described.pitch_v = (number(p, "pitch") for p in pitches)
         described.unit = unit
+        described.half_acquisition = half_acquisition
+        described.padding = choice(_core.Padding, pad, "pad")
         described.name = name
         self._understood = _core.Understood()
         self._source = None
@@ -180,6 +187,8 @@ def read_scan(
     stripes: Union[bool, float, Sequence[float]] = False,
     outliers: Union[float, Sequence[float], None] = None,
     phase: Optional[Sequence[float]] = None,
+    half_acquisition: Optional[bool] = None,
+    pad: str = "none",
     entry: Optional[str] = None,
     views: Union[str, Sequence[Sequence[int]], None] = None,
     darks: Union[str, float, None] = None,
@@ -207,6 +216,9 @@ def read_scan(
     outliers : takes out pixels whose transmission is above their neighbours' median by more than this fraction
         of the open beam; or (fraction, side of the window).
     phase : (distance from object to detector in mm, energy in keV, delta / beta) of Paganin's phase retrieval.
+    half_acquisition : a full turn about an axis off the middle, whose opposite views are rows of a wider detector;
+        by default as axis and arc say, with a warning.
+    pad : "edge" or "mirror": how rows of objects wider than the detector go on beyond it, tapering to zero.
     entry : the group of an HDF5 file that holds the scan, where there are several.
     views : the projections used: "0:40,41:90", or [(0, 40), (41, 90)], half-open.
     darks, flats : "none", or one number that stands for them: counts without beam, counts of the open beam.
@@ -234,6 +246,8 @@ def read_scan(
     if phase is not None:
         members = ("distance_mm", "energy_kev", "delta_beta")
         preparation.phase = _step(_core.PhaseRetrieval(), members, numbers(phase, 3, "phase"), "phase")
+    preparation.half_acquisition = None if half_acquisition is None else bool(half_acquisition)
+    preparation.padding = choice(_core.Padding, pad, "pad")
     options.preparation = preparation
     scan = Scan._of(*_core.read_scan(path, options, progress), _core.ScanSource(path, options))
     for text in scan.warnings:

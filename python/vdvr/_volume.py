@@ -11,6 +11,7 @@ import numpy as np
 from . import _core
 from ._choices import Path, axis, choice, number, numbers, sizes, spacings, takes
 from ._devices import DeviceLike, device as open_device
+from ._measure import Measured
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 TransferLike = Union[str, "os.PathLike[str]", Sequence[Sequence[float]], "_core.TransferFunction", None]
 
 
-class Volume:
+class Volume(Measured):
     """A certified volume V, and the certificate that says how far it lies from F at most.
 
     `volume(points)` is V, `volume.bound(points)` what |V - F| is at most. Made by `build` and `open`. Several

@@ -16,6 +16,7 @@
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/exact_field.hpp"
+#include "vdvr/expert/extend_rows.hpp"
 
 using namespace vdvr;
 using namespace vdvr::testing;
@@ -236,4 +237,55 @@ BOOST_AUTO_TEST_CASE(integrals_that_are_no_logarithms_have_one_variance) {
     BOOST_TEST(!scan_noise(scan, {}, {}, &why).has_value());
     BOOST_TEST(why.find("no noise") != std::string::npos);
   }
+}
+
+// Weights multiply variances by their squares; padded samples, copies of others, are left out.
+BOOST_AUTO_TEST_CASE(sigma_of_longer_rows_is_the_spread_of_repeated_scans) {
+  constexpr double photons = 5000;
+  constexpr int scans = 60;
+  for (const auto& [name, half, padding] : {std::tuple{"half acquisition", true, Padding::none},
+                                            {"half acquisition, padded", true, Padding::edge},
+                                            {"padded", false, Padding::mirror}}) {
+    SimulateOptions o;
+    o.angles = 49;
+    o.arc_deg = 360;
+    o.rows = 2;
+    o.columns = 40;
+    o.detector_offset = half ? 10 : 0;
+    o.band_limited = false;
+    const ProjectionSet measured = simulate(smooth_object(half ? 28 : 40), o);
+    Preparation wanted;
+    wanted.half_acquisition = half;
+    wanted.padding = padding;
+    const auto longer = [&](ProjectionSet scan) {
+      static_cast<void>(extend_rows(scan, wanted));
+      return scan;
+    };
+    LineIntegralNoise noise;
+    noise.photon = {static_cast<float>(1 / photons)};
+    const Agreement found =
+        repeated([&](unsigned seed) { return longer(counted(measured, photons, seed)); }, longer(measured),
+                 noise, {}, some_places(half ? 26 : 16, -0.5, 0.5), scans);
+    check(found, scans, name);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(noise_of_longer_rows_is_that_of_what_was_measured) {
+  SimulateOptions o;
+  o.angles = 180;
+  o.arc_deg = 360;
+  o.rows = 8;
+  o.columns = 64;
+  o.detector_offset = 16;
+  o.band_limited = false;
+  const ProjectionSet measured = counted(simulate(smooth_object(46), o), 5000, 3);
+  ProjectionSet longer = measured;
+  Preparation wanted;
+  wanted.padding = Padding::edge;
+  static_cast<void>(extend_rows(longer, wanted));
+  const auto own = scan_noise(measured, {}), found = scan_noise(longer, {});
+  BOOST_REQUIRE(own.has_value());
+  BOOST_REQUIRE(found.has_value());
+  // Of rows that differ by two roundings of float32.
+  BOOST_TEST(std::abs(found->model.photons / own->model.photons - 1) <= 1e-4);
 }

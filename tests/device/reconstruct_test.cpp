@@ -112,7 +112,7 @@ BOOST_AUTO_TEST_CASE(weights_add_to_pi_for_every_way_to_scan) {
   BOOST_TEST(std::abs(w.weight.front() - 0.5 * w.weight[1]) <= eps);
 }
 
-BOOST_AUTO_TEST_CASE(half_acquisition_is_refused) {
+BOOST_AUTO_TEST_CASE(half_acquisition_whose_rows_nobody_weighted_is_refused) {
   auto scan = vdvr::testing::empty_scan(90, 1, 64, 360);
   scan.geometry.center = 5;
   BOOST_CHECK_THROW(check_scan(scan.geometry), InputError);

@@ -338,3 +338,27 @@ BOOST_AUTO_TEST_CASE(unusable_parameters_are_refused) {
   BOOST_CHECK_THROW(ellipsoid_list({}, 0, "none"), InputError);
   BOOST_CHECK_THROW(ellipsoid_list({{}}, std::nan(""), "background"), InputError);
 }
+
+BOOST_AUTO_TEST_CASE(pores_of_a_foam_lie_in_its_body_and_do_not_touch) {
+  const Phantom p = foam(40, 30, 300, 7);
+  BOOST_TEST_REQUIRE(p.ellipsoids.size() == 301u);
+  BOOST_TEST(p.description == foam(40, 30, 300, 7).description);
+  BOOST_TEST(p.description != foam(40, 30, 300, 8).description);
+  for (std::size_t i = 1; i < p.ellipsoids.size(); ++i) {
+    const Ellipsoid& e = p.ellipsoids[i];
+    BOOST_TEST((e.density == -1 && e.semi_axes[0] == e.semi_axes[1] && e.semi_axes[1] == e.semi_axes[2]));
+    BOOST_TEST(std::abs(e.center[2]) + e.semi_axes[0] <= 30);
+    BOOST_TEST(p.density(e.center) == 0);
+    for (std::size_t j = 1; j < i; ++j) {
+      const Vec3& a = e.center;
+      const Vec3& b = p.ellipsoids[j].center;
+      BOOST_TEST(std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) >
+                 e.semi_axes[0] + p.ellipsoids[j].semi_axes[0]);
+    }
+    // On its surface the body is still there: it touches no edge.
+    const double out = 1.01 * e.semi_axes[0];
+    BOOST_TEST(p.density({e.center[0] + out, e.center[1], e.center[2]}) == 1);
+  }
+  BOOST_CHECK_THROW(foam(40, 30, 0, 1), InputError);
+  BOOST_CHECK_THROW(foam(1, 0.01, 5000, 1), InputError);
+}

@@ -122,7 +122,7 @@ BOOST_AUTO_TEST_CASE(an_unsure_centre_is_called_so_and_the_note_of_other_command
   BOOST_TEST(info.out.find("`vdvr center`") != std::string::npos, info.out);
 }
 
-BOOST_AUTO_TEST_CASE(a_half_acquisition_is_found_and_drawn_and_refused_by_reconstruct) {
+BOOST_AUTO_TEST_CASE(a_half_acquisition_is_found_and_drawn_and_taken_as_such) {
   const std::string stack = at("half.mha"), angles = at("half.txt");
   write_stack(stack, angles, 60, 120, 1, 9.3, 1);
   const auto json =
@@ -131,8 +131,27 @@ BOOST_AUTO_TEST_CASE(a_half_acquisition_is_found_and_drawn_and_refused_by_recons
   BOOST_TEST(std::abs(json.at("found").at("center").get<double>() - 9.3) <= quarter_column);
   BOOST_TEST(json.at("sheet").at("joined") == true);
   BOOST_TEST(json.at("sheet").at("best") == json.at("sheet").at("slices")[2].at("center"));
-  check_refused({"reconstruct", stack, "--angles-file", angles, "-o", at("half_volume.mha")},
-                "`vdvr center` draws slices");
+  BOOST_TEST(json.at("half_acquisition") == true);
+  // Said by whoever recognises it, unless it was stated; of half a turn it is refused.
+  const std::vector<std::string> plan{"reconstruct", stack, "--angles-file",      angles, "--force", "--size",
+                                      "20x20x1",     "-o",  at("half_volume.mha")};
+  const auto with = [&](const std::string& said) {
+    std::vector<std::string> words = plan;
+    words.insert(words.end(), {"--half-acquisition", said});
+    return run(words);
+  };
+  const Ended recognised = run(plan), stated = with("on"), off = with("off");
+  BOOST_TEST(recognised.code == 0, recognised.err);
+  BOOST_TEST(recognised.err.find("WARNING: half acquisition: a full turn about an axis at column 9.2") !=
+                 std::string::npos,
+             recognised.err);
+  BOOST_TEST(stated.code == 0, stated.err);
+  BOOST_TEST(stated.err.find("WARNING") == std::string::npos, stated.err);
+  BOOST_TEST(off.code == 0, off.err);
+  write_stack(at("half_turn.mha"), angles, 60, 120, 0.5, 9.3, 1);
+  check_refused({"reconstruct", at("half_turn.mha"), "--angles-file", angles, "--half-acquisition", "on",
+                 "--center", "9.3", "-o", at("half_volume.mha"), "--force"},
+                "needs a full turn");
 }
 
 BOOST_AUTO_TEST_CASE(what_makes_no_sheet_is_refused_by_name) {

@@ -14,9 +14,12 @@
 #include <utility>
 #include <vector>
 
+#include "host/field/fbp/coverage.hpp"
 #include "tests/support/attack_scans.hpp"
 #include "vdvr/expert/build.hpp"
 #include "vdvr/expert/exact_field.hpp"
+#include "vdvr/expert/extend_rows.hpp"
+#include "vdvr/expert/preparation.hpp"
 #include "vdvr/expert/reconstruct.hpp"
 #include "vdvr/expert/simulate.hpp"
 
@@ -343,8 +346,7 @@ inline bool draw_whole_grid(Random& random, Case& c) {
 /// of a gold cell, on a node, or anywhere between.
 inline void place_grid(Random& random, Case& c) {
   const ParallelGeometry& g = c.scan.geometry;
-  const double half = 0.5 * static_cast<double>(g.rows - 1),
-               radius = std::min(g.center, static_cast<double>(g.columns - 1) - g.center) + 0.5;
+  const double half = 0.5 * static_cast<double>(g.rows - 1), radius = Coverage(g).inner_radius() / g.pitch_u;
   Vec3 at = c.target;
   const int place = std::uniform_int_distribution<int>(0, 3)(random);
   if (place == 1) at = {0, 0, 0};
@@ -431,6 +433,28 @@ inline double draw_factor(Random& random, double decades, bool exact) {
   return exact ? std::exp2(std::round(tens * std::log2(10.0))) : std::pow(10.0, tens);
 }
 
+/// One case in five has longer rows: of half acquisition, whose views then make a full turn about an axis
+/// that leaves an overlap of ten columns or more, or padded ones, or both. Drawn apart, so that other cases
+/// stay as they are.
+inline void draw_longer_rows(std::uint64_t seed, Case& c) {
+  Random random(seed * 0xd1342543de82ef95u + 7);
+  if (!chance(random, 0.2)) return;
+  ParallelGeometry& g = c.scan.geometry;
+  Preparation wanted;
+  wanted.half_acquisition = g.columns >= 11 && g.views() >= 3 && chance(random, 0.6);
+  wanted.padding = one_of(random, {Padding::none, Padding::edge, Padding::mirror});
+  if (*wanted.half_acquisition) {
+    const double near = 5 + unit(random) * (0.5 * static_cast<double>(g.columns) - 5);
+    g.center = (chance(random, 0.5) ? near : static_cast<double>(g.columns) - near) - 0.5;
+    for (std::size_t k = 0; k < g.theta_rad.size(); ++k)
+      g.theta_rad[k] = 2 * std::numbers::pi * (static_cast<double>(k) + 0.3 * (unit(random) - 0.5)) /
+                       static_cast<double>(g.views());
+  }
+  static_cast<void>(extend_rows(c.scan, wanted));
+  c.scan.report.notes.clear();
+  c.name += ", " + text_of(c.scan.report.preparation);
+}
+
 }  // namespace detail
 
 /// The range of F over the covered samples of the grid, at scale 1: of all samples where none is covered.
@@ -456,6 +480,7 @@ inline Case draw_case(std::uint64_t seed) {
   Random random(seed * 0x9e3779b97f4a7c15u + 1);
   Case c;
   draw_scan(random, c);
+  draw_longer_rows(seed, c);
   draw_options(random, c);
   draw_grid(random, c);
   find_range(c);

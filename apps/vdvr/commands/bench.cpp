@@ -326,7 +326,7 @@ int bench_bounds(Arguments& args) {
   Device device = open_device(common);
   ProgressLine progress(args.who(), common.quiet);
   const ProjectionSet scan = load_scan(args.path("IN"), args, field, progress.callback());
-  field.center = center_of(field, scan.geometry);
+  field.center = stated_center(field, scan.geometry);
   const Grid grid = certified_grid(scan, field, grid_options(args));
   const Rates measured{
       rates.upsampling.value_or(8),

@@ -10,6 +10,7 @@
 #include "apps/vdvr/output.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/center_sheet.hpp"
+#include "vdvr/expert/extend_rows.hpp"
 #include "vdvr/expert/find_center.hpp"
 #include "vdvr/expert/preparation.hpp"
 
@@ -107,6 +108,9 @@ int center_command(Arguments& args) {
   const auto path = args.path("IN");
   Wanted wanted;
   wanted.field = field_options(args);
+  // The axis is looked for in the views as they are.
+  wanted.field.preparation.half_acquisition = false;
+  wanted.field.preparation.padding = Padding::none;
   wanted.count = args.integer_or("count", wanted.count, 3, 99);
   if (wanted.count % 2 == 0)
     throw InputError(
@@ -127,10 +131,14 @@ int center_command(Arguments& args) {
       args.integer_or("row", scan.geometry.rows * binning / 2, 0, scan.geometry.rows * binning - 1) / binning;
   report(progress.callback(), "search", 0);
   const auto found = find_center(scan);
+  ParallelGeometry in_use = scan.geometry;
+  if (found && !wanted.field.center) in_use.center = found->center;
+  const bool half = !scan.cone && looks_half_acquired(in_use);
   Json json = {{"file", path.string()},
                {"geometry", geometry_json(scan.geometry)},
                {"report", report_json(scan.report)},
-               {"found", found_json(found, binning)}};
+               {"found", found_json(found, binning)},
+               {"half_acquisition", half}};
   std::optional<CenterSheet> sheet;
   CenterSheetOptions options;
   if (draws) {
@@ -156,14 +164,17 @@ int center_command(Arguments& args) {
     print_found(found, binning);
     fmt::print("in use         {:.2f}, from: {}\n", unbinned_center(scan.geometry.center, binning),
                scan.report.center_source);
+    if (half)
+      fmt::print(
+          "half acquired  a full turn about an axis off the middle{}; `run`, `build` and the others weigh "
+          "them so "
+          "(--half-acquisition auto)\n",
+          sheet && sheet->joined ? ": slices are of opposite views joined" : ", opposite views to be joined");
     if (sheet) {
       if (sheet->best)
         fmt::print("merit          best at {:.2f} of the slices\n",
                    unbinned_center(options.centers[*sheet->best], binning));
       else fmt::print("merit          best at an end of the slices, so it says nothing\n");
-      if (sheet->joined)
-        fmt::print(
-            "half acquired  slices are of opposite views joined; `reconstruct` and `build` do not do that\n");
       fmt::print("written        {}\n", args.text("output"));
     }
   });

@@ -9,6 +9,7 @@
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/noise_words.hpp"
 #include "apps/vdvr/output.hpp"
+#include "vdvr/expert/extend_rows.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/vdvr_file.hpp"
 
@@ -79,7 +80,8 @@ int scan_info(const std::filesystem::path& path, const Arguments& args, const Co
   const ProjectionSet scan = load_scan(path, args, {}, progress.callback(), &understood);
   const NoiseFound noise = noise_of_scan(path, args, {}, scan);
   const Grid grid = make_grid(scan, {});
-  const auto range = std::minmax_element(scan.data.begin(), scan.data.end());
+  const ProjectionSet measured = own_rows(scan);
+  const auto range = std::minmax_element(measured.data.begin(), measured.data.end());
   progress.clear();
   Json json = {{"file", path.string()},
                {"kind", "projections"},

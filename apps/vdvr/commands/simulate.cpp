@@ -20,8 +20,9 @@ namespace {
 
 void add_options(Arguments& args) {
   args.group("Object")
-      .value("phantom", "marschner-lobb|shepp-logan|sphere|FILE.json",
+      .value("phantom", "marschner-lobb|shepp-logan|sphere|foam|FILE.json",
              "a built-in phantom or a list of ellipsoids")
+      .value("pores", "N", "of the foam, which --seed places (default 1000)")
       .value("volume", "FILE", "an MHA or NRRD volume, put centrally on the axis");
   args.group("Scan")
       .value("angles", "K", "views (default 74, 202 or 180: as the object's usual set-up)")
@@ -29,13 +30,14 @@ void add_options(Arguments& args) {
       .value("detector", "UxV", "columns x rows (default 65x65, 129x129, or what the volume needs)")
       .value("pitch", "P[,PV]",
              "world units per column [and per row] (default 1, or the volume's smallest spacing)")
+      .value("detector-offset", "S", "columns by which the detector is moved towards higher ones (default 0)")
       .flag("point", "line integrals at the pixel centres")
       .flag("band-limited", "ideal low-pass at the detector's Nyquist frequency (default)")
       .value("noise-sigma", "S", "Gaussian noise, as a fraction of the largest line integral")
       .value(
           "photons", "N0",
           "counts of N0 photons a pixel in the open beam, with 10 flats and 10 darks, as a detector has them")
-      .value("seed", "N", "of the noise (default 1)")
+      .value("seed", "N", "of the noise, and of a foam (default 1)")
       .value("median", "N", "side of a square median window on the fine detector, odd (default 1: none)")
       .value("gaussian", "SU,SV",
              "standard deviations of a blur on the fine detector, in fine pixels (default none)")
@@ -45,7 +47,6 @@ void add_options(Arguments& args) {
       .value("cone", "R,D",
              "distances from the source to the axis and to the detector; --arc is then 360 by default, and "
              "--pitch that on the detector")
-      .value("detector-offset", "S", "columns by which the detector is moved towards higher ones (default 0)")
       .value("tilt", "IN,OUT", "of the detector in its plane and out of it, degrees (default 0,0)")
       .value("sense", "1|-1", "of rotation (default 1)")
       .value("focal-spot", "W", "side of a square source (default 0: a point)")
@@ -56,6 +57,7 @@ void add_options(Arguments& args) {
 struct Setup {
   std::string name;
   std::optional<Volume> volume;
+  int pores = 0;  ///< of a foam
   SimulateOptions scan;
 };
 
@@ -84,6 +86,8 @@ Setup setup_for(const Arguments& args) {
     return setup;
   }
   setup.name = args.text("phantom");
+  if (setup.name != "foam") refuse(args, {"pores"}, "is for --phantom foam");
+  setup.pores = static_cast<int>(args.integer_or("pores", 1000, 1, 100'000));
   if (setup.name == "marschner-lobb") {
     setup.scan.angles = 74;
     setup.scan.columns = setup.scan.rows = 65;
@@ -96,7 +100,8 @@ Setup setup_for(const Arguments& args) {
 void apply_cone_options(const Arguments& args, SimulateOptions& scan) {
   const auto distances = args.numbers("cone", 2);
   if (!distances) {
-    refuse(args, {"detector-offset", "tilt", "sense", "focal-spot", "supersampling"}, "goes with --cone");
+    scan.detector_offset = args.number_or("detector-offset", 0);
+    refuse(args, {"tilt", "sense", "focal-spot", "supersampling"}, "goes with --cone");
     return;
   }
   ConeSetup cone;
@@ -171,12 +176,15 @@ Phantom phantom_for(Setup& setup) {
   if (setup.volume) return volume_phantom(std::move(*setup.volume));
   const std::filesystem::path file(setup.name);
   if (file.extension() == ".json") return read_phantom(file);
-  if (setup.name != "marschner-lobb" && setup.name != "shepp-logan" && setup.name != "sphere")
+  if (setup.name != "marschner-lobb" && setup.name != "shepp-logan" && setup.name != "sphere" &&
+      setup.name != "foam")
     throw InputError(fmt::format(
-        "--phantom: '{}' is not one of: marschner-lobb, shepp-logan, sphere, FILE.json", setup.name));
+        "--phantom: '{}' is not one of: marschner-lobb, shepp-logan, sphere, foam, FILE.json", setup.name));
   if (!(half_u > 0)) throw InputError(fmt::format("--detector: {} needs at least 2 columns", setup.name));
   if (setup.name == "marschner-lobb") return marschner_lobb(half_u / std::sqrt(2.0));
   if (setup.name == "shepp-logan") return shepp_logan(half_u);
+  if (setup.name == "foam")
+    return foam(half_u - s.pitch_u, half_v > 0 ? half_v : half_u, setup.pores, s.seed);
   return sphere(0.75 * (half_v > 0 ? std::min(half_u, half_v) : half_u));
 }
 

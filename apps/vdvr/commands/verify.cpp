@@ -22,6 +22,7 @@ bool same_preparation(Preparation given, const Preparation& stored) {
     if (given.stripes->large == 0) given.stripes->large = stored.stripes->large;
     if (given.stripes->small == 0) given.stripes->small = stored.stripes->small;
   }
+  if (!given.half_acquisition) given.half_acquisition = stored.half_acquisition;
   return given == stored;
 }
 
@@ -72,7 +73,7 @@ int verify_command(Arguments& args) {
   const VdvrFile file = read_to_verify(path, common.max_memory);
   const Certificate& certificate = file.certificate;
   check_field_options(args, certificate.field);
-  const ProjectionSet scan = load_certified_scan(projections, args, certificate, progress.callback());
+  const ProjectionSet scan = load_scan_to_verify(projections, args, certificate, progress.callback());
   check_projections(projections, scan, certificate);
   Device device = open_device(common);
   VerifyOptions options;

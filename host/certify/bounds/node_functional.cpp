@@ -29,13 +29,19 @@ double factorial_ratio(int n, int m) {  // n! / (n - m)!, 0 for m > n
 // sum |taps| |place|^m + |(kappa^order)^(m)|: at least the m-th derivative of e at |kappa| and below.
 double magnitude(const NodeFunctional& f, std::size_t m, double kappa) {
   double sum = 0;
-  for (std::size_t i = 0; i < f.taps.size(); ++i)
-    sum += std::abs(f.taps[i]) * std::pow(std::abs(f.first + static_cast<double>(i)), static_cast<double>(m));
+  for (std::size_t i = 0; i < f.taps.size(); ++i) {
+    double term = std::abs(f.taps[i]);
+    const double place = std::abs(f.first + static_cast<double>(i));
+    for (std::size_t n = 0; n < m; ++n) term *= place;
+    sum += term;
+  }
+  sum *= 1 + 0x1p-44;  // fewer than a hundred roundings
   const int order = f.order, left = order - static_cast<int>(m);
   return sum + (left < 0 ? 0 : factorial_ratio(order, static_cast<int>(m)) * std::pow(std::abs(kappa), left));
 }
 
-// Of a sum of `f`'s terms in double precision: powers of exp(i kappa) by products, places by powers, the sum.
+// Of a sum of `f`'s terms in double precision: powers of exp(i kappa) by products, places by products, of
+// which there are `highest` and most_moments, and the sum.
 double rounding(const NodeFunctional& f, double magnitude) {
   return 8 * static_cast<double>(f.taps.size() + highest + 4) * 0x1p-53 * magnitude;
 }
@@ -62,21 +68,27 @@ void symbol(const NodeFunctional& f, double kappa, std::size_t count, Complex* d
   }
 }
 
-// At least |e^(m)| on [from, to], m <= highest: a function lies at most step^2 / 8 times its second
-// derivative above the largest of its values `step` apart. The highest two are bounded by `magnitude`.
-Derivatives largest_derivatives(const NodeFunctional& f, double from, double to, int steps) {
-  Derivatives largest{};
-  std::array<Complex, highest - 1> at{};
+// At least |e^(n + m)| on [from, to] for every moment n < moments and m <= highest: a function lies at most
+// step^2 / 8 times its second derivative above the largest of its values `step` apart. The highest two are
+// bounded by `magnitude`.
+std::vector<Derivatives> largest_derivatives(const NodeFunctional& f, double from, double to, int steps,
+                                             std::size_t moments) {
+  const std::size_t known = highest - 1;  // of each moment
+  std::vector<Complex> at(moments + known - 1);
+  std::vector<double> squares(at.size(), 0.0), all;
   for (int s = 0; s <= steps; ++s) {
     symbol(f, from + (to - from) * s / steps, at.size(), at.data());
-    for (std::size_t m = 0; m < at.size(); ++m) largest[m] = std::max(largest[m], std::abs(at[m]));
+    for (std::size_t m = 0; m < at.size(); ++m) squares[m] = std::max(squares[m], std::norm(at[m]));
   }
+  for (std::size_t m = 0; m < moments + highest; ++m) all.push_back(magnitude(f, m, to));
   const double step = (to - from) / steps;
-  for (std::size_t m = highest + 1; m-- > 0;) {
-    const double all = magnitude(f, m, to);
-    largest[m] = m > highest - 2 ? all : largest[m] + rounding(f, all) + step * step / 8 * largest[m + 2];
-  }
-  return largest;
+  std::vector<Derivatives> out(moments);
+  for (std::size_t n = 0; n < moments; ++n)
+    for (std::size_t m = highest + 1; m-- > 0;)
+      out[n][m] = m >= known
+                      ? all[n + m]
+                      : std::sqrt(squares[n + m]) + rounding(f, all[n + m]) + step * step / 8 * out[n][m + 2];
+  return out;
 }
 
 // The cut falls from 1 to 0 as 1 - t^6 (1 + 6 (1 - t) + .. + 252 (1 - t)^5), whose derivative is -2772 (t (1
@@ -125,27 +137,37 @@ double tail(const Derivatives& inside, const Derivatives& falling, double band, 
   return 2 * std::pow(end / std::numbers::pi, 6) * mean / (5 * std::pow(samples / 2.0 - 1, 5));
 }
 
-// sum |a_j|: of the coefficients by FFT, what is beyond them, and what is beyond them folded onto them.
-double coefficient_sum(const NodeFunctional& f, const Derivatives& inside, double band, double end) {
+// sum |a_j| of every moment: of the coefficients by FFT, what is beyond them, and what is beyond them folded
+// onto them.
+std::vector<double> coefficient_sums(const NodeFunctional& f, const std::vector<Derivatives>& inside,
+                                     double band, double end) {
   static const fft::HostFft transform(samples);
   constexpr std::size_t half = samples / 2;
-  std::vector<Complex> g(samples);
+  const std::size_t moments = inside.size();
+  std::vector<std::vector<Complex>> g(moments, std::vector<Complex>(samples));
+  std::vector<Complex> at(moments);
   for (std::size_t s = 0; s <= half; ++s) {
     const double kappa = end * static_cast<double>(s) / static_cast<double>(half);
     const double factor = cut((kappa - band) / (end - band));
     if (!(factor > 0)) continue;  // the last is half: it is 0
-    symbol(f, kappa, 1, &g[s]);
-    g[s] *= factor;
-    if (s > 0) g[samples - s] = std::conj(g[s]);
+    symbol(f, kappa, moments, at.data());
+    for (std::size_t n = 0; n < moments; ++n) {
+      g[n][s] = at[n] * factor;
+      if (s > 0) g[n][samples - s] = std::conj(g[n][s]);
+    }
   }
-  transform.forward(g);
-  double sum = 0;
-  for (const Complex& a : g) sum += std::abs(a) / samples;
-  const Derivatives falling = largest_derivatives(f, band, end, 64);
-  // Errors of the samples and of the FFT, in the 2-norm: sum |a_j| <= sqrt(samples) times the norm of all
-  // a_j.
-  const double noise = std::sqrt(double{samples}) * 8 * rounding(f, magnitude(f, 0, end));
-  return sum + 2 * tail(inside, falling, band, end) + noise;
+  const std::vector<Derivatives> falling = largest_derivatives(f, band, end, 64, moments);
+  std::vector<double> out(moments);
+  for (std::size_t n = 0; n < moments; ++n) {
+    transform.forward(g[n]);
+    double sum = 0;
+    for (const Complex& a : g[n]) sum += std::sqrt(std::norm(a)) / samples;
+    // Errors of the samples and of the FFT, in the 2-norm: sum |a_j| <= sqrt(samples) times the norm of all
+    // a_j.
+    const double noise = std::sqrt(double{samples}) * 8 * rounding(f, magnitude(f, n, end));
+    out[n] = sum + 2 * tail(inside[n], falling[n], band, end) + noise;
+  }
+  return out;
 }
 
 }  // namespace
@@ -157,16 +179,22 @@ double symbol_error(const NodeFunctional& functional, double kappa) {
 }
 
 double largest_symbol_error(const NodeFunctional& functional, double band) {
-  return largest_derivatives(functional, 0, band, 512)[0];
+  return largest_derivatives(functional, 0, band, 512, 1)[0][0];
 }
 
 // A narrow fall is the better where e grows beyond the band, a wide one where it does not.
-double sup_constant(const NodeFunctional& functional, double band) {
-  const Derivatives inside = largest_derivatives(functional, 0, band, 128);
-  double least = HUGE_VAL;
-  for (const double ratio : {1.015, 1.2})
-    least = std::min(least, coefficient_sum(functional, inside, band, band * ratio));
+std::vector<double> moment_sup_constants(const NodeFunctional& functional, double band, std::size_t count) {
+  const std::vector<Derivatives> inside = largest_derivatives(functional, 0, band, 128, count);
+  std::vector<double> least(count, HUGE_VAL);
+  for (const double ratio : {1.015, 1.2}) {
+    const std::vector<double> found = coefficient_sums(functional, inside, band, band * ratio);
+    for (std::size_t n = 0; n < count; ++n) least[n] = std::min(least[n], found[n]);
+  }
   return least;
+}
+
+double sup_constant(const NodeFunctional& functional, double band) {
+  return moment_sup_constants(functional, band, 1)[0];
 }
 
 }  // namespace vdvr

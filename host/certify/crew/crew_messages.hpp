@@ -48,8 +48,11 @@ inline Bytes message_to_open(CrewWord word, const CrewOptions& options) {
 // --- what is said, member by member (bytes.hpp) ---
 
 void members(auto& way, Of<Grid> auto& g) { way(g.cells, g.origin, g.spacing, g.unit); }
+void members(auto& way, Of<RowExtension> auto& e) {
+  way(e.half_acquisition, e.padding, e.before, e.after, e.center);
+}
 void members(auto& way, Of<ParallelGeometry> auto& g) {
-  way(g.columns, g.rows, g.pitch_u, g.pitch_v, g.center, g.unit, g.theta_rad);
+  way(g.columns, g.rows, g.pitch_u, g.pitch_v, g.center, g.unit, g.theta_rad, g.extension);
 }
 void members(auto& way, Of<IntegerLattice> auto& l) {
   way(l.step, l.base, l.least, l.base_shift, l.finest_shift);

@@ -23,8 +23,9 @@ static_assert(sizeof(VdvrFourthDifferences) == 44);
 namespace {
 
 constexpr double pi = std::numbers::pi;
-// Bricks of a block's side.
-constexpr std::int64_t block_bricks = 8;
+// Bricks of a block's side. Of cone beam half as many across: nodes of all that a block reads are kept, and
+// they cost more.
+constexpr std::int64_t block_bricks = 8, cone_block_bricks = 4;
 // Nodes that a fourth difference reads on either side.
 constexpr std::int64_t reach = 2;
 // fp32: up to nine terms with weights that add to 16, in units of u times the largest value.
@@ -198,11 +199,13 @@ template <class Visit>
 void BrickRemainder::for_each_block(Visit&& visit) const {
   Block block;
   Index3& first = block.first;
-  for (first[2] = -rings_[2]; first[2] < bricks_[2] + rings_[2]; first[2] += block_bricks)
-    for (first[1] = -rings_[1]; first[1] < bricks_[1] + rings_[1]; first[1] += block_bricks)
-      for (first[0] = -rings_[0]; first[0] < bricks_[0] + rings_[0]; first[0] += block_bricks) {
+  const std::int64_t across = scan_.views.empty() ? block_bricks : cone_block_bricks;
+  const Index3 side{across, across, block_bricks};
+  for (first[2] = -rings_[2]; first[2] < bricks_[2] + rings_[2]; first[2] += side[2])
+    for (first[1] = -rings_[1]; first[1] < bricks_[1] + rings_[1]; first[1] += side[1])
+      for (first[0] = -rings_[0]; first[0] < bricks_[0] + rings_[0]; first[0] += side[0]) {
         for (std::size_t a = 0; a < 3; ++a)
-          block.bricks[a] = std::min(block_bricks, bricks_[a] + rings_[a] - first[a]);
+          block.bricks[a] = std::min(side[a], bricks_[a] + rings_[a] - first[a]);
         visit(block);
       }
 }

@@ -8,6 +8,7 @@
 #include <map>
 #include <optional>
 #include <span>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -57,6 +58,8 @@ class ConeTiles {
   /// of eight lanes; and tables of all views. Memory: tables of some views, at most a quarter of what is
   /// left.
   void back_project(std::span<const ConePage> pages, const Progress& progress);
+  /// Seconds that the tables of the last call took.
+  [[nodiscard]] double table_seconds() const { return table_seconds_; }
   /// From now on without strips, as devices do whose work-items share caches: for tests.
   void take_no_strips() { in_runs_ = false; }
   [[nodiscard]] bool in_runs() const { return in_runs_; }
@@ -84,7 +87,7 @@ class ConeTiles {
     std::optional<GoldFilter> filter;
     double error = 0;  ///< at least |filtered - F| where exact nodes are filtered along the axis
   };
-  [[nodiscard]] BestFilter best_filter(int phases, std::size_t axis, int taps) const;
+  [[nodiscard]] BestFilter best_filter(int phases, std::size_t axis, int taps);
   /// At least |filtered - F| where exact nodes are filtered along z, then y, then x.
   [[nodiscard]] double filter_error(const GoldFilter& x, const GoldFilter& y, const GoldFilter& z);
 
@@ -110,7 +113,10 @@ class ConeTiles {
     constexpr double least = 0.05;  // a single row does not vary along z
     return std::max(least, axis == 2 ? band_[2] : std::max(band_[0], band_[1]));
   }
-  [[nodiscard]] double largest(std::size_t axis, const ProjectiveError& error) const;
+  /// `of_parallel`: as if no view grew along the axis, at most what they err.
+  [[nodiscard]] double largest(std::size_t axis, const ProjectiveError& error,
+                               bool of_parallel = false) const;
+  [[nodiscard]] std::vector<double> bands_seen(std::size_t axis) const;
   const ProjectiveError& error_of(std::size_t axis, const GoldFilter& filter);
 
   opencl::State& state_;
@@ -124,10 +130,11 @@ class ConeTiles {
   bool upright_ = true, in_double_ = true, in_runs_ = true;
   double sup_ = 0, largest_weight_ = 0;
   Vec3 band_{};
+  double table_seconds_ = 0;
   double row_step_ = 0;     // rows of the table from a node to the one above it
   double block_reach_ = 0;  // columns or rows of the table from a block's middle to its nodes
   std::array<std::vector<std::vector<ViewAtPart>>, 3> at_parts_;  // where filters along the axis fill
-  std::map<const GoldFilter*, ProjectiveError> filters_;
+  std::map<std::tuple<bool, int, std::vector<float>>, ProjectiveError> filters_;  // along z, rate, weights
 };
 
 }  // namespace vdvr

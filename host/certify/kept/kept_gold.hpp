@@ -104,8 +104,10 @@ class KeptGold {
   /// left: journals count passes.
   [[nodiscard]] std::int64_t cells_together() const;
 
-  /// Seconds of all calls of prepare, for the columns of the detector and for the tiles, kept tiles, and how
-  /// many tiles boxes would add.
+  /// Seconds of all calls of prepare; of these, for the columns of the detector (of cone beam, whose views
+  /// are upsampled anew each time, of one call) and for the tiles; kept tiles, and how many tiles boxes would
+  /// add.
+  [[nodiscard]] double prepare_seconds() const { return prepare_seconds_; }
   [[nodiscard]] double column_seconds() const { return column_seconds_; }
   [[nodiscard]] double tile_seconds() const { return tile_seconds_; }
   [[nodiscard]] std::int64_t tiles() const { return static_cast<std::int64_t>(tiles_.size()); }
@@ -226,7 +228,7 @@ class KeptGold {
   std::array<opencl::DeviceArray<float>, 2> buffers_;
   std::optional<CommonGold> common_;  // until it is made
   HostMemory common_bytes_;           // this device's part of it
-  double column_seconds_ = 0, tile_seconds_ = 0;
+  double column_seconds_ = 0, tile_seconds_ = 0, prepare_seconds_ = 0;
 };
 
 }  // namespace vdvr

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <span>
+#include <vector>
 
 #include "host/base/system/parallel.hpp"
 #include "host/certify/bounds/node_functional.hpp"
@@ -9,41 +12,65 @@
 namespace vdvr {
 namespace {
 
-// Bands for which constants are known, evenly spaced; and moments t^0 .. t^16. Beyond these, magnitudes.
-constexpr std::size_t bands = 24, moments = 17;
+// Bands for which constants are known, evenly spaced. Beyond so many moments, magnitudes.
+constexpr std::size_t bands = 24, moments = most_moments;
 // Sums of fewer than a thousand products of numbers >= 0, in double precision.
 constexpr double rounding = 1 + 0x1p-40;
 
-// The filter at `phase` as a sum over t, times t^moment: what it should be is the value itself, or nothing.
-NodeFunctional functional(const GoldFilter& filter, int phase, std::size_t moment) {
+// The filter at `phase`, which stands for the value itself.
+NodeFunctional functional(const GoldFilter& filter, int phase) {
   NodeFunctional f;
   f.first = filter.first() - static_cast<double>(phase) / filter.rate;
-  f.order = moment == 0 ? 0 : -1;
   for (int i = 0; i < filter.taps; ++i)
-    f.taps.push_back(static_cast<double>(filter.weights[static_cast<std::size_t>(phase * filter.taps + i)]) *
-                     std::pow(f.first + i, static_cast<double>(moment)));
+    f.taps.push_back(static_cast<double>(filter.weights[static_cast<std::size_t>(phase * filter.taps + i)]));
   return f;
+}
+
+std::vector<double> all_bands(double highest) {
+  std::vector<double> out;
+  for (std::size_t band = 0; band < bands; ++band)
+    out.push_back(highest * (static_cast<double>(band) + 0.5) / bands);
+  return out;
 }
 
 }  // namespace
 
 ProjectiveError::ProjectiveError(const GoldFilter& filter, double highest)
+    : ProjectiveError(filter, highest, all_bands(highest), moments) {}
+
+ProjectiveError::ProjectiveError(const GoldFilter& filter, double highest, std::span<const double> for_bands,
+                                 std::size_t of_moments)
     : highest_(highest), reach_(0.5 * filter.taps), norm_(filter.norm) {
   if (filter.rate == 1) return;
-  constants_.assign(moments, std::vector<double>(bands, 0.0));
-  parallel_for(static_cast<std::int64_t>(moments * bands), {}, "", [&](std::int64_t n) {
-    const auto moment = static_cast<std::size_t>(n) / bands, band = static_cast<std::size_t>(n) % bands;
-    // Other phases mirror these, and what a filter errs of a mirrored function is the same.
-    for (int phase = 1; 2 * phase <= filter.rate; ++phase)
-      constants_[moment][band] = std::max(
-          constants_[moment][band],
-          sup_constant(functional(filter, phase, moment), highest * static_cast<double>(band + 1) / bands));
+  constants_.assign(bands, {});
+  std::vector<std::size_t> places;
+  for (const double band : for_bands)
+    if (const std::size_t place = place_of(band); constants_[place].empty()) {
+      constants_[place].assign(of_moments, 0.0);
+      places.push_back(place);
+    }
+  // Other phases mirror these, and what a filter errs of a mirrored function is the same.
+  const auto phases = static_cast<std::size_t>(filter.rate / 2);
+  std::vector<std::vector<double>> found(places.size() * phases);
+  parallel_for(static_cast<std::int64_t>(found.size()), {}, "", [&](std::int64_t n) {
+    const auto i = static_cast<std::size_t>(n);
+    found[i] =
+        moment_sup_constants(functional(filter, static_cast<int>(i % phases) + 1),
+                             highest * static_cast<double>(places[i / phases] + 1) / bands, of_moments);
   });
+  for (std::size_t i = 0; i < found.size(); ++i)
+    std::ranges::transform(constants_[places[i / phases]], found[i], constants_[places[i / phases]].begin(),
+                           [](double a, double b) { return std::max(a, b); });
 }
 
-double ProjectiveError::constant(std::size_t moment, std::size_t band, double magnitude) const {
-  if (moment >= moments) return magnitude;
-  const double known = constants_[moment][band];
+std::size_t ProjectiveError::place_of(double band) const {
+  return static_cast<std::size_t>(
+      std::clamp(std::ceil(band / highest_ * bands - 1), 0.0, static_cast<double>(bands - 1)));
+}
+
+double ProjectiveError::constant(std::size_t moment, std::size_t place, double magnitude) const {
+  if (moment >= constants_[place].size()) return moment == 0 ? HUGE_VAL : magnitude;
+  const double known = constants_[place][moment];
   return moment == 0 ? known : std::min(known, magnitude);
 }
 
@@ -54,9 +81,9 @@ double ProjectiveError::at(double band, double rho) const {
   // Terms fall at last like those of exp(band reach growth / (1 - growth)) (1 - growth)^-2, which all of
   // them, by magnitudes, add up to.
   const double exponent = band * reach_ * growth / (1 - growth);
-  const double all = norm_ * std::exp(exponent) / ((1 - growth) * (1 - growth)), negligible = 0x1p-60 * all;
-  const auto place = static_cast<std::size_t>(
-      std::clamp(std::ceil(band / highest_ * bands - 1), 0.0, static_cast<double>(bands - 1)));
+  // What is cut off is added by magnitude, some 1e-12 of the whole, where an error is 1e-7 at least.
+  const double all = norm_ * std::exp(exponent) / ((1 - growth) * (1 - growth)), negligible = 0x1p-44 * all;
+  const std::size_t place = place_of(band);
   double sum = 0, magnitudes = 0;
   double of_m = 1, power_m = norm_;  // (|rho| band)^m / m!, and norm reach^2m
   for (int m = 0; of_m * power_m > negligible; ++m) {

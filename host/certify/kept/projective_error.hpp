@@ -2,6 +2,7 @@
 // (docs/error-bounds.md, section 16).
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "host/certify/kept/gold_filters.hpp"
@@ -16,18 +17,23 @@ namespace vdvr {
 /// and of each term the filter makes a sum over band-limited values, which sup_constant bounds.
 class ProjectiveError {
  public:
-  /// Of bands up to `highest`. Cost: some 200 sup_constants for each pair of phases.
+  /// Of bands up to `highest`. Cost: 24 bands of moment_sup_constants for each pair of phases.
   ProjectiveError(const GoldFilter& filter, double highest);
+  /// The same, for some bands only: elsewhere the error is infinite. Beyond `moments` magnitudes are taken: 1
+  /// does for rho 0. Cost: as much less.
+  ProjectiveError(const GoldFilter& filter, double highest, std::span<const double> for_bands,
+                  std::size_t moments);
   /// At least |filtered - f| / (lambda^-2 sup |g|), at any phase. Infinite where `band` exceeds the highest
   /// or lambda vanishes among the taps.
   [[nodiscard]] double at(double band, double rho) const;
 
  private:
+  [[nodiscard]] std::size_t place_of(double band) const;
   // `magnitude`: what it is at most whatever the band.
   [[nodiscard]] double constant(std::size_t moment, std::size_t band, double magnitude) const;
 
   double highest_ = 0, reach_ = 0, norm_ = 0;
-  std::vector<std::vector<double>> constants_;  // [moment][band]; none of a copy
+  std::vector<std::vector<double>> constants_;  // [band][moment]; none of a copy
 };
 
 }  // namespace vdvr

@@ -11,6 +11,7 @@
 #include "host/base/system/casts.hpp"
 #include "host/field/fbp/view_weights.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/extend_rows.hpp"
 #include "vdvr/expert/reconstruct.hpp"
 
 namespace vdvr {
@@ -21,11 +22,19 @@ constexpr int circles = 64;
 
 }  // namespace
 
+std::pair<double, double> seen_columns(const ParallelGeometry& g) {
+  const auto before = static_cast<double>(g.extension.before), after = static_cast<double>(g.extension.after);
+  const double below = g.center - before + 0.5,
+               above = static_cast<double>(g.columns) - after - 0.5 - g.center;
+  if (!g.extension.half_acquisition.value_or(false)) return {below, above};
+  return {std::max(below, above), std::max(below, above)};
+}
+
 Coverage::Coverage(const ParallelGeometry& g)
     // A point exactly on the detector's edge counts as covered whatever the rounding of its t.
     : slack_(1e-9 * g.pitch_u), slack_z_(1e-9 * g.pitch_v) {
-  const double below = (g.center + 0.5) * g.pitch_u,
-               above = (static_cast<double>(g.columns) - 0.5 - g.center) * g.pitch_u,
+  const auto [of_columns, beyond] = seen_columns(g);
+  const double below = of_columns * g.pitch_u, above = beyond * g.pitch_u,
                half_height = 0.5 * static_cast<double>(g.rows - 1) * g.pitch_v;
   heights_ = {-half_height, half_height};
   inner_ = std::min(below, above);
@@ -253,19 +262,12 @@ std::vector<std::string> check_scan(const ParallelGeometry& g) {
   for (const double theta : g.theta_rad)
     if (!std::isfinite(theta)) throw InputError("an angle is not finite");
   const Coverage coverage(g);
-  const auto [low, high] = std::minmax_element(g.theta_rad.begin(), g.theta_rad.end());
-  const double arc = *high - *low, below = g.center + 0.5,
-               above = static_cast<double>(g.columns) - 0.5 - g.center;
-  // An axis within the outer quarter of a full-turn scan means half acquisition.
-  if (arc > 1.5 * std::numbers::pi && std::min(below, above) < 0.5 * std::max(below, above)) {
+  if (!g.extension.half_acquisition && looks_half_acquired(g))
     throw InputError(fmt::format(
-        "the axis projects onto column {:.2f} of {} in a scan over {:.0f} degrees: half acquisition, "
-        "which needs weights in u that this version does not have. `vdvr center` draws slices of it; join "
-        "its "
-        "opposite views to half a turn of a wider detector first, or correct `center`",
-        g.center, g.columns, arc * 180 / std::numbers::pi));
-  }
-  const ViewWeights weights = view_weights(g.theta_rad);
+        "the axis projects onto column {:.2f} of {} in a scan all around: half acquisition, whose rows are "
+        "weighted when it is read (extend_rows); or correct `center`",
+        g.center, g.columns));
+  const ViewWeights weights = view_weights(g);
   require_directions(weights);
   return weights.notes;
 }

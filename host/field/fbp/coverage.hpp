@@ -11,6 +11,10 @@
 
 namespace vdvr {
 
+/// How far from the axis the detector sees on either side, in columns, to its edges. Of half acquisition,
+/// where opposite views are one, as far as the longer side.
+std::pair<double, double> seen_columns(const ParallelGeometry& geometry);
+
 /// The region across z is the intersection of half-planes, a convex polygon around the axis; along z it is an
 /// interval of heights.
 class Coverage {

@@ -100,7 +100,7 @@ void measure_views(FilteredScan& out, std::span<const float> data, const ViewWei
 ParallelGeometry used_geometry(const ProjectionSet& scan, const FieldOptions& field, const Units& units) {
   require_parallel(scan, "filter_projections");
   ParallelGeometry geometry = from_world(scan.geometry, units);
-  if (field.center) geometry.center = *field.center;
+  geometry.center = center_of(field, geometry);
   return geometry;
 }
 
@@ -131,7 +131,7 @@ FilteredScan filter_projections(opencl::State& state, const ProjectionSet& scan,
   FilteredScan out;
   out.geometry = used_geometry(scan, field, units);
   const ParallelGeometry& g = out.geometry;
-  const ViewWeights weights = view_weights(g.theta_rad);
+  const ViewWeights weights = view_weights(g);
 
   out.fft_length = fft::good_length(2 * g.columns - 1);
   const auto filter = make_row_filter(state, g, ramp_kernel(field, g.pitch_u, g.columns), method, precision);
@@ -155,7 +155,7 @@ std::uint64_t slab_bytes(const DeviceInfo& device, const ParallelGeometry& geome
 DirectFilter::DirectFilter(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
                            const Units& units)
     : state_(&state), data_(scan, units), geometry_(used_geometry(scan, field, units)) {
-  weights_ = view_weights(geometry_.theta_rad).weight;
+  weights_ = view_weights(geometry_).weight;
   filter_ = make_row_filter(state, geometry_, ramp_kernel(field, geometry_.pitch_u, geometry_.columns),
                             FilterMethod::automatic, Precision::fp32);
 }

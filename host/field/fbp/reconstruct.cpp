@@ -203,7 +203,7 @@ void reconstruct_parallel(opencl::State& state, const ScanInUnits& from, const G
     return slab;
   };
   ParallelGeometry geometry = from_world(scan.geometry, units);
-  if (options.field.center) geometry.center = *options.field.center;
+  geometry.center = center_of(options.field, geometry);
   reconstruct_slabs(state, geometry, make_slab, grid, options.upsampling, options.interpolation, planes,
                     progress, watch);
 }

@@ -69,6 +69,13 @@ ViewWeights view_weights(const std::vector<double>& theta_rad, double period, Ar
   return result;
 }
 
+ViewWeights view_weights(const ParallelGeometry& g) {
+  if (!g.extension.half_acquisition.value_or(false)) return view_weights(g.theta_rad);
+  ViewWeights weights = view_weights(g.theta_rad, 2 * std::numbers::pi);
+  for (double& w : weights.weight) w *= 0.5;
+  return weights;
+}
+
 void require_directions(const ViewWeights& weights) {
   if (weights.one_direction)
     throw InputError(

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "vdvr/expert/projections.hpp"
+
 namespace vdvr {
 
 struct ViewWeights {
@@ -24,6 +26,10 @@ enum class Arc { closed, open };
 /// usual gaps. O(n log n) time.
 ViewWeights view_weights(const std::vector<double>& theta_rad, double period = std::numbers::pi,
                          Arc arc = Arc::closed);
+
+/// Those of a parallel scan, which add to pi. Of half acquisition a view's opposite one does not see the
+/// same: half of what it weighs modulo 2 pi.
+ViewWeights view_weights(const ParallelGeometry& geometry);
 
 /// Throws InputError where all views see one direction, or an arc so short that its angles must be radians
 /// that were read as degrees: F would be worthless.

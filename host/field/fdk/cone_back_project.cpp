@@ -23,7 +23,15 @@ constexpr int most_spans = 10;
 // Rows beyond the margins on either side: a vector with a lane that is wanted begins as many rows below, and
 // ends as many above.
 constexpr std::int64_t rows_of_vectors = longest_vector + most_spans + 4;
+// Alike of a single lane, which reads two.
+constexpr std::int64_t rows_of_lane = 2;
 constexpr int views_together = 8;
+// Of fewer planes most lanes would be idle.
+constexpr std::int64_t fewest_planes = 4;
+
+std::int64_t rows_around(const ConeMargins& margins) {
+  return margins.rows + (margins.vectors ? rows_of_vectors : rows_of_lane);
+}
 
 std::int64_t mirrored(std::int64_t i, std::int64_t n) {
   const std::int64_t period = 2 * n, m = ((i % period) + period) % period;
@@ -38,7 +46,7 @@ struct TableShape {
 TableShape shape_of(const FilteredScan& scan, int rate, const ConeMargins& margins) {
   const ParallelGeometry& g = scan.geometry;
   TableShape s{upsampled_columns(g.columns, rate, static_cast<double>(margins.columns)),
-               (g.rows - 1 + 2 * (margins.rows + rows_of_vectors)) * rate + 1, 0};
+               (g.rows - 1 + 2 * rows_around(margins)) * rate + 1, 0};
   // Of each phase; vectors read past the last row.
   s.row_stride = rate * column_stride((s.rows + rate - 1) / rate + longest_vector);
   return s;
@@ -72,11 +80,11 @@ void copy_upsampled(opencl::State& state, Upsampler& upsampler, const UpsampledC
   for (std::size_t r = 0; r < rows.size(); ++r)
     rows[r] = table.first_row + static_cast<double>(r) / table.rate;
   const UpsampledSlab slab = upsampler(columns, rows, 0, 0, table.rate, table.first_view, table.views);
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int> kernel(state, "field/fdk/join_rows",
-                                                                                "join_rows");
-  const auto all = table.views * table.columns;
-  kernel({{count(table.row_stride), count(all), 1}, {64, 1, 1}}, table.values.buffer(), slab.values.buffer(),
-         to_int(all), to_int(table.rows), to_int(table.rate), to_int(table.row_stride / table.rate));
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int> kernel(
+      state, "field/fdk/join_rows", "join_rows", {{"VDVR_RATE", std::to_string(table.rate)}});
+  const std::int64_t all = table.views * table.columns, of_phase = table.row_stride / table.rate;
+  kernel({{count(of_phase), count(table.rate), count(all)}, {16, 1, 1}}, table.values.buffer(),
+         slab.values.buffer(), to_int(all), to_int(table.rows), to_int(of_phase));
   opencl::finish(state, "upsampled rows");  // before the slab goes
 }
 
@@ -168,6 +176,15 @@ Spread spread_of(const FilteredScan& scan, const ConeTable& table, const ConeBan
 
 }  // namespace
 
+bool planes_suit_vectors(const FilteredScan& scan, const Grid& grid) {
+  if (grid.samples()[2] < fewest_planes) return false;
+  // Of a plane at the axis, where lambda is 1: beyond what vectors may lie between, single lanes are taken.
+  return std::ranges::all_of(scan.views, [&](const ViewMatrix& m) {
+    const double beyond = std::abs(std::abs(m[1][2]) * grid.spacing[2] - 1);
+    return static_cast<double>(longest_vector - 1) * beyond < most_spans;
+  });
+}
+
 std::uint64_t cone_table_bytes(const FilteredScan& scan, int rate, const ConeMargins& margins,
                                std::int64_t views) {
   const TableShape s = shape_of(scan, rate, margins);
@@ -183,9 +200,10 @@ ConeTable cone_table(opencl::State& state, const FilteredScan& scan, Upsampler& 
                   s.rows,
                   s.row_stride,
                   s.columns.position(0),
-                  -static_cast<double>(margins.rows + rows_of_vectors),
+                  -static_cast<double>(rows_around(margins)),
                   first,
-                  views};
+                  views,
+                  margins.vectors};
   table.values =
       opencl::DeviceArray<float>(state, count(views * s.columns.count * s.row_stride), "filtered views");
   if (rate == 1) copy_pixels(scan, table);
@@ -195,7 +213,7 @@ ConeTable cone_table(opencl::State& state, const FilteredScan& scan, Upsampler& 
 
 void cone_back_project(opencl::State& state, const FilteredScan& scan, const ConeTable& table,
                        const ConeBand& band, opencl::DeviceArray<float>& out) {
-  cone_back_project(state, scan, table, band, out, column_tuning(state.info).lanes);
+  cone_back_project(state, scan, table, band, out, table.vectors ? column_tuning(state.info).lanes : 1);
 }
 
 void cone_back_project(opencl::State& state, const FilteredScan& scan, const ConeTable& table,

@@ -18,12 +18,17 @@ struct ConeTable {
   std::int64_t columns = 0, rows = 0, row_stride = 0;
   double first_column = 0, first_row = 0;  ///< detector places of the first ones
   std::int64_t first_view = 0, views = 0;
+  bool vectors = true;  ///< of planes may read it
 };
 
 /// How many columns and rows of a table are mirrored on each side, in pixels.
 struct ConeMargins {
   std::int64_t columns = 0, rows = 0;
+  bool vectors = true;  ///< of planes may read it: they reach further along rows than single ones
 };
+
+/// Whether vectors of planes pay: there are enough of them, and rows of the detector lie about as far apart.
+bool planes_suit_vectors(const FilteredScan& scan, const Grid& grid);
 
 /// Views [first, first + count). Cost: rate 1: a copy; else as Upsampler's. `upsampler`: of the same scan.
 ConeTable cone_table(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, int rate,

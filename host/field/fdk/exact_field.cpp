@@ -65,7 +65,7 @@ std::shared_ptr<double[]> zeros(std::size_t n, const std::shared_ptr<Scratch>& s
 struct WeighedViews {
   WeighedViews(const ProjectionSet& of, const FieldOptions& field) : scan(of), columns(of.geometry.columns) {
     if (!scan.cone) {
-      weight = view_weights(scan.geometry.theta_rad).weight;
+      weight = view_weights(scan.geometry).weight;
       return;
     }
     const ConeGeometry cone = used_cone(scan, field);
@@ -99,7 +99,7 @@ struct WeighedViews {
 
 ExactField::ExactField(const ProjectionSet& scan, const FieldOptions& field, const Progress& progress)
     : geometry_(scan.geometry) {
-  if (field.center) geometry_.center = *field.center;
+  geometry_.center = center_of(field, geometry_);
   const WeighedViews views(scan, field);
   if (scan.cone) {
     cone_coverage_ = std::make_shared<ConeCoverage>(cone_coverage(scan, field));

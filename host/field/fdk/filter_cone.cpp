@@ -62,7 +62,7 @@ ConeCoverage cone_coverage(const ProjectionSet& scan, const FieldOptions& field)
 
 Coverage certified_coverage(const ProjectionSet& scan, const FieldOptions& field) {
   ParallelGeometry g = scan.geometry;
-  if (field.center) g.center = *field.center;
+  g.center = center_of(field, g);
   if (!scan.cone) return Coverage(g);
   const Padded detector(scan, field);
   g.columns = detector.columns;

@@ -37,7 +37,8 @@ ConeMargins margins_of(const FilteredScan& scan, const Grid& grid) {
     columns = std::max(columns, 2 * kept_distance(grid) / view.pitch_u);
     rows = std::max(rows, 2 * kept_distance(grid) / view.pitch_v);
   }
-  return {static_cast<std::int64_t>(std::ceil(columns)) + 1, static_cast<std::int64_t>(std::ceil(rows)) + 1};
+  return {static_cast<std::int64_t>(std::ceil(columns)) + 1, static_cast<std::int64_t>(std::ceil(rows)) + 1,
+          planes_suit_vectors(scan, grid)};
 }
 
 // The planes of a slab that are kept of each column.
@@ -77,6 +78,8 @@ struct Sizes {
   std::int64_t planes, band, views;  // of a slab, rows of a band, views of a chunk
 };
 
+constexpr std::uint64_t enough_bytes = std::uint64_t{128} << 20;
+
 // A slab's planes and a band's columns take a quarter of what is left each, views another.
 Sizes sizes_for(const opencl::State& state, const FilteredScan& scan, int rate, const ConeMargins& margins,
                 const Index3& n, std::uint64_t plane_bytes) {
@@ -89,10 +92,14 @@ Sizes sizes_for(const opencl::State& state, const FilteredScan& scan, int rate, 
   s.planes = plane_bytes == 0 ? n[2] : most(plane_bytes, n[2]);
   s.planes = std::min(s.planes, std::int64_t{1024});
   s.band = most(sizeof(float) * count(n[0] * column_stride(std::max<std::int64_t>(s.planes, 1))), n[1]);
-  if (s.band > VDVR_CONE_BLOCK) s.band = s.band / VDVR_CONE_BLOCK * VDVR_CONE_BLOCK;
+  if (s.band > VDVR_CONE_BLOCK && s.band < n[1]) s.band = s.band / VDVR_CONE_BLOCK * VDVR_CONE_BLOCK;
   // Upsampled views pass through a slab of their own.
   const std::uint64_t per_view = cone_table_bytes(scan, rate, margins, 1) * (rate == 1 ? 1 : 2);
   s.views = most(per_view, scan.geometry.views());
+  // Where no table is made twice, small ones do: they are no faster for being large.
+  if (s.planes == n[2] && s.band == n[1])
+    s.views =
+        std::min(s.views, std::max<std::int64_t>(1, static_cast<std::int64_t>(enough_bytes / per_view)));
   if (s.planes < 1 || s.band < 1 || s.views < 1)
     throw ResourceError(
         fmt::format("a view of {} x {} pixels at `upsampling` {} needs {:.1f} MiB, a plane of the volume "

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "vdvr/error.hpp"
+#include "vdvr/expert/extend_rows.hpp"
 #include "vdvr/expert/find_center.hpp"
 #include "vdvr/expert/hash.hpp"
 #include "vdvr/expert/reconstruct.hpp"
@@ -103,6 +104,11 @@ ProjectionSet scan_of_array(SampleArray data, const ArrayScan& described) {
   scan.report.format = "array";
   scan.report.sha256 = hash_of(scan.data, described);
   set_center(scan, described.center);
+  Preparation wanted;
+  wanted.half_acquisition = described.half_acquisition;
+  wanted.padding = described.padding;
+  if (std::string recognised = extend_rows(scan, wanted); !recognised.empty())
+    scan.report.notes.push_back(std::move(recognised));
   for (auto& note : check_scan(scan)) scan.report.notes.push_back(std::move(note));
   return scan;
 }
@@ -116,11 +122,11 @@ std::vector<double> degrees_of(std::span<const double> radians) {
 Grid slices_of_rows(const ParallelGeometry& geometry) {
   const auto half = [](std::int64_t samples) { return 0.5 * static_cast<double>(samples - 1); };
   GridOptions options;
-  const std::int64_t cells = std::max<std::int64_t>(1, geometry.columns - 1);
+  const std::int64_t columns = own_detector(geometry).columns, cells = std::max<std::int64_t>(1, columns - 1);
   options.size = {cells, cells, std::max<std::int64_t>(1, geometry.rows - 1)};
   options.spacing = geometry.pitch_u;
   options.spacing_z = geometry.pitch_v;
-  const double edge = -half(geometry.columns) * geometry.pitch_u;
+  const double edge = -half(columns) * geometry.pitch_u;
   options.origin = {edge, edge, -half(geometry.rows) * geometry.pitch_v};
   return make_grid(geometry, options);
 }

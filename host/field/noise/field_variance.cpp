@@ -26,6 +26,7 @@
 #include "host/field/fdk/filter_cone.hpp"
 #include "host/field/fdk/reconstruct_cone.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/extend_rows.hpp"
 
 namespace vdvr {
 namespace {
@@ -34,14 +35,40 @@ namespace {
 constexpr std::int64_t reach = 12, block = 8;
 constexpr std::int64_t rows_together = 16;
 
+// The variance of samples of the scan's rows, which may be longer than the detector's: those of half
+// acquisition were multiplied by a factor f, and have f^2 times the variance. Samples that padding added are
+// copies of others and are left out: by t columns from the edge they change sigma by less than 3 % / t^2
+// (docs/noise.md).
+class SampleVariance {
+ public:
+  SampleVariance(const ParallelGeometry& g, const LineIntegralNoise& noise)
+      : variance_(noise),
+        factors_(row_factors(g)),
+        columns_(g.columns),
+        own_(own_detector(g).columns),
+        before_(g.extension.before) {}
+  double operator()(std::int64_t row, std::int64_t column, float sample) const {
+    const auto factor = static_cast<double>(factors_[at(column)]);
+    if (factor == 0) return 0;
+    const std::size_t pixel = at(row * own_ + column - before_);
+    return factor * factor * variance_(pixel, static_cast<double>(sample) / factor);
+  }
+  /// Of a view's samples, one row after another.
+  double of_sample(std::int64_t i, float sample) const { return (*this)(i / columns_, i % columns_, sample); }
+
+ private:
+  PixelVariance variance_;
+  std::vector<float> factors_;
+  std::int64_t columns_, own_, before_;
+};
+
 double largest_variance(const ProjectionSet& scan, const LineIntegralNoise& noise) {
   const std::int64_t pixels = scan.geometry.rows * scan.geometry.columns;
-  const PixelVariance variance(noise);
+  const SampleVariance variance(scan.geometry, noise);
   std::vector<double> largest(at(scan.geometry.views()), 0.0);
   parallel_for(scan.geometry.views(), {}, "", [&](std::int64_t k) {
     for (std::int64_t i = 0; i < pixels; ++i)
-      largest[at(k)] =
-          std::max(largest[at(k)], variance(at(i), static_cast<double>(scan.data[at(k * pixels + i)])));
+      largest[at(k)] = std::max(largest[at(k)], variance.of_sample(i, scan.data[at(k * pixels + i)]));
   });
   const double all = *std::max_element(largest.begin(), largest.end());
   if (!(all > 0) || !std::isfinite(all))
@@ -53,23 +80,23 @@ double largest_variance(const ProjectionSet& scan, const LineIntegralNoise& nois
 }
 
 // v of some heights of a view, double out[height][column].
-void variance_of_rows(std::span<const float> view, const ParallelGeometry& g, const PixelVariance& variance,
+void variance_of_rows(std::span<const float> view, const ParallelGeometry& g, const SampleVariance& variance,
                       std::span<const std::vector<RowShare>> heights, std::vector<double>& out) {
   std::fill(out.begin(), out.end(), 0.0);
   for (std::size_t h = 0; h < heights.size(); ++h)
     for (const RowShare& share : heights[h])
       for (std::int64_t i = 0; i < g.columns; ++i) {
-        const std::size_t pixel = at(share.row * g.columns + i);
-        out[h * at(g.columns) + at(i)] += share.weight * variance(pixel, static_cast<double>(view[pixel]));
+        out[h * at(g.columns) + at(i)] +=
+            share.weight * variance(share.row, i, view[at(share.row * g.columns + i)]);
       }
 }
 
 FieldVariance of_parallel(opencl::State& state, const ProjectionSet& scan, const FieldOptions& field,
                           const LineIntegralNoise& noise, const Grid& grid, const Progress& progress) {
   ParallelGeometry g = scan.geometry;
-  if (field.center) g.center = *field.center;
+  g.center = center_of(field, g);
   const SquaredFilter filter(field);
-  const std::vector<double> weights = view_weights(g.theta_rad).weight;
+  const std::vector<double> weights = view_weights(g).weight;
   const double pitch = 1 / (g.pitch_u * g.pitch_u);
   double heaviest = 0;
   for (const double w : weights) heaviest = std::max(heaviest, w * w);
@@ -80,7 +107,7 @@ FieldVariance of_parallel(opencl::State& state, const ProjectionSet& scan, const
   out.scale = unit * pitch;
   const std::vector<double> places = detector_rows(g, grid.origin[2], grid.spacing[2], n[2]);
   const UpsampledColumns columns = upsampled_columns(g.columns, 2, 1);
-  const PixelVariance variance(noise);
+  const SampleVariance variance(g, noise);
   ColumnBlocks blocks;
   blocks.nx = n[0];
   blocks.ny = n[1];

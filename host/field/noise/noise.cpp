@@ -11,6 +11,7 @@
 #include "host/field/noise/field_variance.hpp"
 #include "host/field/noise/passed_noise.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/extend_rows.hpp"
 
 namespace vdvr {
 namespace {
@@ -133,6 +134,7 @@ std::optional<ScanNoise> scan_noise(const ProjectionSet& scan, const NoiseOption
       given->words += "; the projections were prepared, which lowers their noise: sigma is too large";
     return given;
   }
+  if (scan.geometry.extension != RowExtension{}) return scan_noise(own_rows(scan), options, by_flats, why);
   const auto none = [&](std::string reason) -> std::optional<ScanNoise> {
     if (why) *why = std::move(reason);
     return std::nullopt;

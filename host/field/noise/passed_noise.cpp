@@ -190,7 +190,10 @@ Powers powers_of(const RowSpectrum& spectrum, const float* one, const float* oth
 }  // namespace
 
 bool changes_noise(Preparation preparation) {
+  // Sums of neighbours, and weights: noise is followed through them.
   preparation.binning = Preparation{}.binning;
+  preparation.half_acquisition = {};
+  preparation.padding = {};
   return !preparation.none();
 }
 

@@ -4,6 +4,7 @@
 #include "host/field/noise/field_variance.hpp"
 #include "host/field/noise/passed_noise.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/extend_rows.hpp"
 #include "vdvr/expert/noise.hpp"
 #include "vdvr/expert/preparation.hpp"
 
@@ -15,6 +16,7 @@ ScanOptions as_measured(ScanOptions how, const ProjectionSet& scan) {
   if (!scan.cone || how.center)
     how.center = unbinned_center(how.center.value_or(scan.geometry.center), how.preparation.binning);
   how.preparation = {};
+  how.preparation.half_acquisition = false;
   return how;
 }
 
@@ -48,6 +50,8 @@ std::optional<ScanNoise> of_prepared(const std::filesystem::path& path, const Sc
 std::optional<ScanNoise> read_scan_noise(const std::filesystem::path& path, const ScanOptions& how,
                                          const ProjectionSet& scan, const NoiseOptions& options,
                                          std::string* why, const Progress& progress) {
+  if (scan.geometry.extension != RowExtension{})
+    return read_scan_noise(path, how, own_rows(scan), options, why, progress);
   if (!changes_noise(scan.report.preparation)) {
     const bool stated = options.photons || options.sigma_p;
     return scan_noise(scan, options, stated ? std::nullopt : read_line_noise(path, how), why);

@@ -10,6 +10,7 @@
 #include "host/base/system/parallel.hpp"
 #include "host/field/fdk/filter_cone.hpp"
 #include "host/field/noise/estimate_photons.hpp"
+#include "vdvr/expert/extend_rows.hpp"
 #include "vdvr/expert/noise.hpp"
 #include "vdvr/expert/reconstruct.hpp"
 
@@ -23,9 +24,14 @@ constexpr double least_radius = 5;
 // Beyond it a column's median is the object, not its noise or a bent background.
 constexpr double share_of_object = 0.05;
 
-double modulo_pi(double theta) {
-  const double t = std::fmod(theta, pi);
-  return t < 0 ? t + pi : t;
+double modulo(double theta, double period) {
+  const double t = std::fmod(theta, period);
+  return t < 0 ? t + period : t;
+}
+
+// After which views see the same: opposite ones do, but of half acquisition, where each sees its own side.
+double period_of(const ParallelGeometry& g) {
+  return g.extension.half_acquisition.value_or(false) ? 2 * pi : pi;
 }
 
 // The middle rows of a scan; of noise what belongs to them.
@@ -53,9 +59,9 @@ Middle middle_rows(const ProjectionSet& scan, const LineIntegralNoise& noise) {
     std::copy_n(scan.data.begin() + (k * g.rows + first) * g.columns, rows * g.columns,
                 data.begin() + k * rows * g.columns);
   out.scan.data = SampleArray(std::move(data));
+  const std::int64_t own = own_detector(g).columns;
   for (std::vector<float>* values : {&out.noise.photon, &out.noise.read})
-    if (values->size() > 1)
-      *values = {values->begin() + first * g.columns, values->begin() + (first + rows) * g.columns};
+    if (values->size() > 1) *values = {values->begin() + first * own, values->begin() + (first + rows) * own};
   return out;
 }
 
@@ -84,12 +90,13 @@ double views_of_half(const ProjectionSet& scan, const std::vector<int>& signs) {
   if (scan.cone)
     return 0.5 * static_cast<double>(signs.size()) * pi / std::max(pi, source_arc(*scan.cone).arc_rad);
   std::vector<double> angles;
-  for (const double t : scan.geometry.theta_rad) angles.push_back(modulo_pi(t));
+  const double period = period_of(scan.geometry);
+  for (const double t : scan.geometry.theta_rad) angles.push_back(modulo(t, period));
   std::sort(angles.begin(), angles.end());
-  const double near = 1e-3 * pi / static_cast<double>(angles.size());
+  const double near = 1e-3 * period / static_cast<double>(angles.size());
   const auto last =
       std::unique(angles.begin(), angles.end(), [&](double a, double b) { return b - a < near; });
-  return 0.5 * static_cast<double>(last - angles.begin());
+  return 0.5 * static_cast<double>(last - angles.begin()) * pi / period;
 }
 
 }  // namespace
@@ -103,10 +110,11 @@ std::vector<int> alternating_signs(const ProjectionSet& scan) {
     return signs;
   }
   std::vector<std::pair<double, std::size_t>> angles;
-  for (std::size_t k = 0; k < theta.size(); ++k) angles.emplace_back(modulo_pi(theta[k]), k);
+  const double period = period_of(scan.geometry);
+  for (std::size_t k = 0; k < theta.size(); ++k) angles.emplace_back(modulo(theta[k], period), k);
   std::sort(angles.begin(), angles.end());
   // Views closer than a thousandth of the mean step see the same.
-  const double near = 1e-3 * pi / static_cast<double>(theta.size());
+  const double near = 1e-3 * period / static_cast<double>(theta.size());
   int sign = 1;
   for (std::size_t i = 0; i < angles.size(); ++i) {
     if (i > 0 && angles[i].first - angles[i - 1].first >= near) sign = -sign;
@@ -120,7 +128,7 @@ std::optional<SplitOfViews> split_of_views(Device& device, const ProjectionSet& 
                                            const Progress& progress) {
   Middle middle = middle_rows(scan, noise);
   ParallelGeometry& g = middle.scan.geometry;
-  const double center = field.center.value_or(g.center);
+  const double center = center_of(field, g);
   const std::vector<int> signs = alternating_signs(scan);
   SplitOfViews out;
   // World lengths, as seen at the axis.

@@ -91,6 +91,11 @@ std::string Description::text(const std::string& key) const {
   return json_.at(key).get<std::string>();
 }
 
+bool Description::flag(const std::string& key) const {
+  if (!json_.at(key).is_boolean()) fail(fmt::format("{} must be true or false", quoted(key)));
+  return json_.at(key).get<bool>();
+}
+
 double Description::number(const std::string& key) const {
   if (!has(key)) fail(fmt::format("{} is missing; it must be a number", quoted(key)));
   if (!json_.at(key).is_number()) fail(fmt::format("{} must be a number", quoted(key)));

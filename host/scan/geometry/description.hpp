@@ -41,6 +41,7 @@ class Description {
     return is_list(key) && !json_.at(key).empty() && json_.at(key)[0].is_array();
   }
   [[nodiscard]] std::string text(const std::string& key) const;
+  [[nodiscard]] bool flag(const std::string& key) const;
   [[nodiscard]] double number(const std::string& key) const;
   [[nodiscard]] double number_or(const std::string& key, double fallback) const;
   [[nodiscard]] double positive(const std::string& key) const;

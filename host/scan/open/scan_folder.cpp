@@ -25,9 +25,10 @@ namespace {
 namespace fs = std::filesystem;
 
 std::set<std::string> known_members() {
-  std::set<std::string> known{"projections", "hdf5",       "flats", "darks", "angles",      "angle_range",
-                              "use",         "center",     "pitch", "unit",  "air_columns", "description",
-                              "comment",     "redundancy", "beam",  "entry", "angle_unit"};
+  std::set<std::string> known{"projections", "hdf5",        "flats",           "darks",      "angles",
+                              "angle_range", "use",         "center",          "pitch",      "unit",
+                              "air_columns", "description", "comment",         "redundancy", "beam",
+                              "entry",       "angle_unit",  "half_acquisition"};
   known.insert(cone_kinds.begin(), cone_kinds.end());
   return known;
 }
@@ -208,6 +209,7 @@ RawScan open_hdf5(const Description& about, const ScanOptions& options, bool con
 
 void set_geometry(const Description& about, RawScan& scan) {
   if (about.has("center")) scan.center = about.number("center");
+  if (about.has("half_acquisition")) scan.half_acquisition = about.flag("half_acquisition");
   if (about.has("unit")) scan.unit = about.text("unit");
   if (about.has("pitch")) {
     std::tie(scan.pitch_u, scan.pitch_v) = about.pair("pitch");

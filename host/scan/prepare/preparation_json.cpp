@@ -60,11 +60,15 @@ Json json_of(const Preparation& p) {
   if (p.median > 1) json["median"] = p.median;
   if (p.gaussian != std::array<double, 2>{0, 0}) json["gaussian"] = p.gaussian;
   if (p.binning > 1) json["binning"] = p.binning;
+  if (p.half_acquisition) json["half_acquisition"] = *p.half_acquisition;
+  if (p.padding != Padding::none) json["pad"] = text_of(p.padding);
   return json;
 }
 
 Preparation preparation_of(const Json& json) {
-  require_members(json, "preparation", {"outliers", "phase", "stripes", "median", "gaussian", "binning"});
+  require_members(
+      json, "preparation",
+      {"outliers", "phase", "stripes", "median", "gaussian", "binning", "half_acquisition", "pad"});
   Preparation p;
   if (json.contains("outliers")) {
     const Json& o = json.at("outliers");
@@ -90,6 +94,17 @@ Preparation preparation_of(const Json& json) {
     p.gaussian = {number(o.at(0), "gaussian"), number(o.at(1), "gaussian")};
   }
   if (json.contains("binning")) p.binning = whole(json.at("binning"), "binning");
+  if (json.contains("half_acquisition")) {
+    if (!json.at("half_acquisition").is_boolean())
+      throw InputError("half_acquisition: expected true or false");
+    p.half_acquisition = json.at("half_acquisition").get<bool>();
+  }
+  if (json.contains("pad")) {
+    const Json& text = json.at("pad");
+    const auto padding = padding_of(text.is_string() ? text.get<std::string>() : "");
+    if (!padding) throw InputError("pad: expected \"none\", \"edge\" or \"mirror\"");
+    p.padding = *padding;
+  }
   check_preparation(p);
   return p;
 }

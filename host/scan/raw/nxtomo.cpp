@@ -203,6 +203,7 @@ RawScan open_nxtomo(const Reader& file, const TomoEntry& where, const Hdf5Wanted
   if (wanted.beam == Beam::cone) {
     set_nxtomo_cone(file, groups, scan);
   } else {
+    if (is_half_acquisition(file, where.detector)) scan.half_acquisition = true;
     note_flips(file, where.detector, scan);
     if (!wanted.beam) warn_of_magnification(file, groups, scan);
   }

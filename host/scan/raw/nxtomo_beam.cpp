@@ -63,13 +63,6 @@ double needed_length(const Reader& file, const std::string& object, const std::s
   return *value * to_unit_of(file, object, unit);
 }
 
-// Of a detector's half_acquisition or field_of_view: whether the axis lies near its edge.
-bool is_half(const Reader& file, const std::string& detector) {
-  const std::string flag = detector + "/half_acquisition", text = detector + "/field_of_view";
-  if (file.is_dataset(flag)) return file.flag(flag);
-  return file.is_dataset(text) && file.text(text, 64) == "Half";
-}
-
 // The axis' column or row. nxtomo defines the field as a place on the detector; nabu and tomoscan read what
 // ESRF writes as an offset from its middle. The reading is taken that puts the axis where a full or a half
 // field of view has it.
@@ -143,7 +136,7 @@ void place_axis(const Reader& file, const NxtomoGroups& groups, const RawScan& s
                     older = groups.detector + "/estimated_cor_from_motor",
                     row = groups.detector + "/y_rotation_axis_pixel_position";
   const std::string stated = file.is_dataset(column) ? column : older;
-  const bool half = file.is_dataset(stated) && is_half(file, groups.detector);
+  const bool half = file.is_dataset(stated) && is_half_acquisition(file, groups.detector);
   const auto center = axis_position(file, stated, scan.columns, half, "column", out.notes);
   out.center_source = center ? "file" : "default";
   view.center = center.value_or(stack.middle_column());
@@ -158,6 +151,12 @@ void place_axis(const Reader& file, const NxtomoGroups& groups, const RawScan& s
 }
 
 }  // namespace
+
+bool is_half_acquisition(const Reader& file, const std::string& detector) {
+  const std::string flag = detector + "/half_acquisition", text = detector + "/field_of_view";
+  if (file.is_dataset(flag)) return file.flag(flag);
+  return file.is_dataset(text) && file.text(text, 64) == "Half";
+}
 
 void set_nxtomo_cone(const Reader& file, const NxtomoGroups& groups, RawScan& scan) {
   RawCone cone;

@@ -23,4 +23,7 @@ void set_nxtomo_cone(const hdf5::Reader& file, const NxtomoGroups& groups, RawSc
 /// that this moves one by more than a quarter of a pixel within the object.
 void warn_of_magnification(const hdf5::Reader& file, const NxtomoGroups& groups, RawScan& scan);
 
+/// Of a detector's half_acquisition or field_of_view: whether the axis lies near its edge.
+bool is_half_acquisition(const hdf5::Reader& file, const std::string& detector);
+
 }  // namespace vdvr::io

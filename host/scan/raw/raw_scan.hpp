@@ -58,6 +58,7 @@ struct RawScan {
   std::optional<SampleValues> stated;  ///< what the file or scan.json says that values are
   std::string values_source;           ///< who says it
   std::optional<double> center;
+  std::optional<bool> half_acquisition;  ///< what the file or scan.json says
   double pitch_u = 1, pitch_v = 1;
   bool pitch_stated = false;
   std::string unit = "pixel";

@@ -50,6 +50,8 @@ void check(const Phantom& phantom, const SimulateOptions& o) {
     refuse("detector", fmt::format("{}x{}", o.columns, o.rows), "at least 1x1");
   if (!positive(o.pitch_u)) refuse("pitch in u", o.pitch_u, "a positive length");
   if (!positive(o.pitch_v)) refuse("pitch in v", o.pitch_v, "a positive length");
+  if (!(std::abs(o.detector_offset) < 0.5 * static_cast<double>(o.columns)))
+    refuse("detector-offset", o.detector_offset, "columns that leave the axis on the detector");
   if (!not_negative(o.noise_sigma))
     refuse("noise-sigma", o.noise_sigma, "0 or a fraction of the largest line integral");
   if (o.median < 0 || (o.median > 0 && o.median % 2 == 0))
@@ -78,14 +80,15 @@ FineDetector fine_detector(const SimulateOptions& o) {
       o.columns * o.binning, o.rows * o.binning, o.pitch_u / o.binning, o.pitch_v / o.binning, {}, {}};
   const std::int64_t rate = o.band_limited ? BandLimiter::rate : 1;
   // Twice the distance from the detector's middle, in samples, is an integer: u is exactly antisymmetric.
-  const auto positions = [](std::int64_t n, double spacing) {
+  const auto positions = [](std::int64_t n, double spacing, double offset) {
     std::vector<double> x(static_cast<std::size_t>(n));
     for (std::int64_t i = 0; i < n; ++i)
-      x[static_cast<std::size_t>(i)] = static_cast<double>(2 * i + 1 - n) / 2 * spacing;
+      x[static_cast<std::size_t>(i)] = static_cast<double>(2 * i + 1 - n) / 2 * spacing + offset;
     return x;
   };
-  d.u = positions(d.columns * rate, d.pitch_u / static_cast<double>(rate));
-  d.v = positions(d.rows, d.pitch_v);
+  d.u = positions(d.columns * rate, d.pitch_u / static_cast<double>(rate),
+                  o.cone ? 0.0 : o.detector_offset * o.pitch_u);
+  d.v = positions(d.rows, d.pitch_v, 0);
   return d;
 }
 
@@ -276,6 +279,7 @@ std::string options_text(const Phantom& phantom, const SimulateOptions& o) {
                       {"median", std::max(o.median, 1)},
                       {"gaussian", {o.gaussian_u, o.gaussian_v}},
                       {"binning", o.binning}};
+  if (o.detector_offset != 0) text["detector_offset"] = o.detector_offset;
   if (o.cone)
     text["cone"] = {{"source_to_axis", o.cone->source_to_axis},
                     {"source_to_detector", o.cone->source_to_detector},
@@ -317,7 +321,7 @@ ProjectionSet simulate(const Phantom& phantom, const SimulateOptions& options, c
                      options.rows,
                      options.pitch_u,
                      options.pitch_v,
-                     static_cast<double>(options.columns - 1) / 2,
+                     static_cast<double>(options.columns - 1) / 2 - options.detector_offset,
                      options.unit,
                      simulator.theta()};
     if (options.cone) {

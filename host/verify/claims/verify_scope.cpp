@@ -12,6 +12,7 @@
 #include "host/base/system/casts.hpp"
 #include "host/field/fdk/filter_cone.hpp"
 #include "host/volume/covered_range.hpp"
+#include "vdvr/expert/extend_rows.hpp"
 #include "vdvr/expert/region_of_interest.hpp"
 
 namespace vdvr {
@@ -64,12 +65,28 @@ void compare_views(Compare& out, const nlohmann::json& g, const std::optional<Co
   }
 }
 
+void compare_extension(Compare& out, const nlohmann::json& g, const RowExtension& used) {
+  const bool longer = used.before > 0 || used.after > 0;
+  if (g.contains("extension") != longer)
+    return out.differs(
+        fmt::format("options.geometry.extension is {}", longer ? "missing" : "not of these rows"));
+  if (!longer) return;
+  const auto& e = g.at("extension");
+  out.integer("options.geometry.extension.half_acquisition", e.at("half_acquisition").get<bool>() ? 1 : 0,
+              used.half_acquisition.value_or(false) ? 1 : 0);
+  out.text("options.geometry.extension.pad", e.at("pad").get<std::string>(), text_of(used.padding));
+  out.integer("options.geometry.extension.before", e.at("before").get<std::int64_t>(), used.before);
+  out.integer("options.geometry.extension.after", e.at("after").get<std::int64_t>(), used.after);
+  out.number("options.geometry.extension.center", e.at("center").get<double>(), used.center);
+}
+
 void compare_geometry(Compare& out, const nlohmann::json& g, const ParallelGeometry& used) {
   out.integer("options.geometry.columns", g.at("columns").get<std::int64_t>(), used.columns);
   out.integer("options.geometry.rows", g.at("rows").get<std::int64_t>(), used.rows);
   out.number("options.geometry.pitch_u", g.at("pitch_u").get<double>(), used.pitch_u);
   out.number("options.geometry.pitch_v", g.at("pitch_v").get<double>(), used.pitch_v);
   out.number("options.geometry.center", g.at("center").get<double>(), used.center);
+  compare_extension(out, g, used.extension);
   out.text("options.geometry.unit", g.at("unit").get<std::string>(), used.unit);
   const auto theta = g.at("theta_rad").get<std::vector<double>>();
   out.integer("the number of angles of options.geometry", static_cast<std::int64_t>(theta.size()),
@@ -117,7 +134,8 @@ void compare_options(Compare& out, const Certificate& c, const MixedVolume& v, c
 }
 
 void compare_input(Compare& out, const ProjectionSet& scan, const Certificate& c) {
-  const std::vector<std::int64_t> shape{scan.geometry.views(), scan.geometry.rows, scan.geometry.columns};
+  const std::vector<std::int64_t> shape{scan.geometry.views(), scan.geometry.rows,
+                                        own_detector(scan.geometry).columns};
   out.equal("input.shape", c.input_shape, shape, c.input_shape == shape);
   out.integer("input.angles", c.input_angles, scan.geometry.views());
 }

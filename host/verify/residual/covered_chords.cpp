@@ -4,13 +4,14 @@
 #include <cmath>
 
 #include "host/base/system/parallel.hpp"
+#include "host/field/fbp/coverage.hpp"
 
 namespace vdvr {
 
 CoveredChords covered_chords(const ParallelGeometry& g) {
   const auto columns = static_cast<std::size_t>(g.columns), views = g.theta_rad.size();
-  const double low = (-0.5 - g.center) * g.pitch_u,
-               high = (static_cast<double>(g.columns) - 0.5 - g.center) * g.pitch_u;
+  const auto [below, above] = seen_columns(g);
+  const double low = -below * g.pitch_u, high = above * g.pitch_u;
   CoveredChords out;
   for (std::size_t i = 0; i < columns; ++i) out.u.push_back((static_cast<double>(i) - g.center) * g.pitch_u);
   out.first.assign(views * columns, -INFINITY);

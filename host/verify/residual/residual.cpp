@@ -14,6 +14,7 @@
 #include "host/verify/residual/primitives.hpp"
 #include "host/verify/residual/row_integrals.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/extend_rows.hpp"
 
 namespace vdvr {
 namespace {
@@ -73,8 +74,10 @@ Residual residual(const ProjectionSet& scan, const MixedVolume& volume, const Ce
                   const ResidualOptions& options, const Progress& progress) {
   check(scan, certificate);
   Residual out;
-  out.geometry = scan.geometry;
-  out.geometry.center = certificate.field.center.value_or(scan.geometry.center);
+  ParallelGeometry longer = scan.geometry;
+  longer.center = center_of(certificate.field, longer);
+  out.geometry = own_detector(longer);
+  out.geometry.center = stated_center(certificate.field, longer);
   std::tie(out.first_row, out.rows) = wanted_rows(scan.geometry, options);
   const ParallelGeometry& g = out.geometry;
   const std::vector<float> bounds = brick_bounds(certificate, false);
@@ -83,7 +86,10 @@ Residual residual(const ProjectionSet& scan, const MixedVolume& volume, const Ce
   for (auto* values : {&out.lo, &out.hi, &out.reach})
     values->assign(rays, std::numeric_limits<float>::quiet_NaN());
 
-  const CoveredChords chords = covered_chords(g);
+  // Rays are the detector's own; F is of longer rows, where rows were made so.
+  const CoveredChords chords = covered_chords(longer);
+  const std::vector<float> factors = row_factors(longer);
+  const bool weighted = longer.extension.half_acquisition.value_or(false);
   const double middle = 0.5 * static_cast<double>(g.rows - 1);
   for (std::int64_t row = out.first_row; row < out.first_row + out.rows; ++row) {
     const auto done = static_cast<double>(row - out.first_row), all = static_cast<double>(out.rows);
@@ -95,17 +101,27 @@ Residual residual(const ProjectionSet& scan, const MixedVolume& volume, const Ce
       const double c = std::cos(g.theta_rad[static_cast<std::size_t>(view)]),
                    s = std::sin(g.theta_rad[static_cast<std::size_t>(view)]);
       for (std::int64_t i = 0; i < g.columns; ++i) {
-        const auto ray = static_cast<std::size_t>(view * g.columns + i);
+        const std::int64_t column = i + longer.extension.before;
+        const auto ray = static_cast<std::size_t>(view * longer.columns + column);
         if (!(chords.first[ray] < chords.last[ray])) continue;
-        const auto measured =
-            static_cast<double>(scan.data[static_cast<std::size_t>((view * g.rows + row) * g.columns + i)]);
-        const double rest = measured - f.integral[ray],
-                     error = f.error[ray] + 0x1p-52 * (std::abs(measured) + std::abs(f.integral[ray]));
+        const double measured =
+            static_cast<double>(
+                scan.data[static_cast<std::size_t>((view * g.rows + row) * longer.columns + column)]) /
+            static_cast<double>(factors[static_cast<std::size_t>(column)]);
+        // A weighted sample was rounded to float32, below the normal numbers by more.
+        const double rounded =
+                         weighted
+                             ? 0x1p-23 * std::abs(measured) +
+                                   0x1p-149 / static_cast<double>(factors[static_cast<std::size_t>(column)])
+                             : 0,
+                     rest = measured - f.integral[ray],
+                     error =
+                         f.error[ray] + rounded + 0x1p-52 * (std::abs(measured) + std::abs(f.integral[ray]));
         const std::size_t at = out.index(view, row, i);
         out.lo[at] = down(rest - error);
         out.hi[at] = up(rest + error);
         out.reach[at] =
-            up(along(c, s, chords.u[static_cast<std::size_t>(i)], chords.first[ray], chords.last[ray]));
+            up(along(c, s, chords.u[static_cast<std::size_t>(column)], chords.first[ray], chords.last[ray]));
       }
     });
   }

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "vdvr/expert/extend_rows.hpp"
 #include "vdvr/expert/residual.hpp"
 
 namespace vdvr {
@@ -47,6 +48,8 @@ double median_rms(const std::vector<ResidualLine>& all) {
 
 ResidualSummary summary_of(const Residual& r, const ProjectionSet& scan) {
   const ParallelGeometry& g = r.geometry;
+  const std::int64_t wide = scan.geometry.columns;
+  const std::vector<float> factors = row_factors(scan.geometry);
   ResidualSummary out;
   std::vector<Sums> views(static_cast<std::size_t>(g.views())), columns(static_cast<std::size_t>(g.columns));
   Sums all;
@@ -55,10 +58,14 @@ ResidualSummary summary_of(const Residual& r, const ProjectionSet& scan) {
     for (std::int64_t v = r.first_row; v < r.first_row + r.rows; ++v)
       for (std::int64_t i = 0; i < g.columns; ++i) {
         const std::size_t at = r.index(k, v, i);
+        const std::int64_t column = i + scan.geometry.extension.before;
         const double measured = std::abs(
-            static_cast<double>(scan.data[static_cast<std::size_t>((k * g.rows + v) * g.columns + i)]));
+            static_cast<double>(scan.data[static_cast<std::size_t>((k * g.rows + v) * wide + column)]) /
+            static_cast<double>(factors[static_cast<std::size_t>(column)]));
         largest = std::max(largest, measured);
-        if (i == 0 || i == g.columns - 1) edge = std::max(edge, measured);
+        // The nearer edge of half acquisition is within the object; rows are weighted down to nothing there.
+        if ((i == 0 || i == g.columns - 1) && factors[static_cast<std::size_t>(column)] >= 1)
+          edge = std::max(edge, measured);
         ++out.rays;
         if (std::isnan(r.lo[at])) continue;
         const bool beyond = r.beyond_interpolation(at);

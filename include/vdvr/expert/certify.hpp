@@ -50,9 +50,4 @@ VDVR_API BuildResult certify(Device& device, const ProjectionSet& scan, const To
 VDVR_API BuildResult certify(Device& device, const ProjectionSet& scan, Plan plan,
                              const CertifyOptions& options = {}, const Progress& progress = {});
 
-/// The centre that defines F: the field's, else the scan's.
-inline double center_of(const FieldOptions& field, const ParallelGeometry& geometry) {
-  return field.center.value_or(geometry.center);
-}
-
 }  // namespace vdvr

@@ -6,7 +6,9 @@
 #include <string_view>
 #include <utility>
 
+#include "vdvr/error.hpp"
 #include "vdvr/expert/preparation_steps.hpp"
+#include "vdvr/expert/projections.hpp"
 
 namespace vdvr {
 
@@ -34,10 +36,28 @@ constexpr std::optional<RampWindow> ramp_window_of(std::string_view text) {
 struct FieldOptions {
   RampWindow filter = RampWindow::ram_lak;
   double cutoff = 1.0;           ///< fraction of the detector's Nyquist frequency
-  std::optional<double> center;  ///< overrides the scan's; in columns of the prepared projections
+  std::optional<double> center;  ///< overrides the scan's; in columns of the prepared projections,
+                                 ///< without those that rows were given beyond the detector
   /// What was done to the projections. It is done where they are read (ScanOptions), and recorded here.
   Preparation preparation{};
   bool operator==(const FieldOptions&) const = default;
 };
+
+/// The centre that defines F, the field's, else the scan's: a column of the detector's own.
+inline double stated_center(const FieldOptions& field, const ParallelGeometry& g) {
+  const bool longer = g.extension.before > 0 || g.extension.after > 0;
+  return field.center.value_or(longer ? g.extension.center : g.center);
+}
+
+/// The same as a column of the scan's rows, which may have been made longer. Throws InputError where rows of
+/// half acquisition were weighted about another centre.
+inline double center_of(const FieldOptions& field, const ParallelGeometry& g) {
+  if (!field.center) return g.center;
+  const double center = *field.center + static_cast<double>(g.extension.before);
+  if (g.extension.half_acquisition.value_or(false) && center != g.center)
+    throw InputError(
+        "half acquisition: the rows were weighted about another centre; read the scan with this one");
+  return center;
+}
 
 }  // namespace vdvr

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <optional>
+#include <string_view>
 
 namespace vdvr {
 
@@ -34,6 +35,19 @@ struct Stripes {
   bool operator==(const Stripes&) const = default;
 };
 
+/// What rows go on with beyond the detector, tapering to zero, where the object is wider than it: nothing,
+/// the outermost sample, or the row's mirror image (docs/geometry.md, "Rows that go on").
+enum class Padding { none, edge, mirror };
+constexpr const char* text_of(Padding padding) {
+  return padding == Padding::edge ? "edge" : padding == Padding::mirror ? "mirror" : "none";
+}
+
+constexpr std::optional<Padding> padding_of(std::string_view text) {
+  for (const Padding p : {Padding::none, Padding::edge, Padding::mirror})
+    if (text == text_of(p)) return p;
+  return {};
+}
+
 /// Steps in the order in which they are done. By default none.
 struct Preparation {
   std::optional<Outliers> outliers;
@@ -42,6 +56,10 @@ struct Preparation {
   int median = 1;                        ///< side of a square window, odd; 1: none
   std::array<double, 2> gaussian{0, 0};  ///< standard deviations in columns and rows; 0: none
   int binning = 1;                       ///< columns and rows of a detector pixel that become one
+  /// Whether opposite views about an axis off the middle make one row of a wider detector (docs/geometry.md,
+  /// "Half acquisition"). Without a value, axis and arc decide when the scan is read.
+  std::optional<bool> half_acquisition;
+  Padding padding = Padding::none;
 
   [[nodiscard]] bool none() const { return *this == Preparation{}; }
   bool operator==(const Preparation&) const = default;

@@ -16,6 +16,16 @@
 
 namespace vdvr {
 
+/// What rows have beyond the detector's own columns (extend_rows.hpp), and how their samples were weighted.
+struct RowExtension {
+  /// True: rows are weighted as those of half acquisition; false: it was stated that they are none.
+  std::optional<bool> half_acquisition;
+  Padding padding = Padding::none;
+  std::int64_t before = 0, after = 0;  ///< columns added on either side
+  double center = 0;                   ///< column of the axis among the detector's own, where any were added
+  bool operator==(const RowExtension&) const = default;
+};
+
 struct ParallelGeometry {
   std::int64_t columns = 0;  ///< U
   std::int64_t rows = 0;     ///< V
@@ -24,6 +34,7 @@ struct ParallelGeometry {
   double center = 0.0;       ///< column onto which the rotation axis projects; (U - 1)/2 in a centred scan
   std::string unit = "pixel";
   std::vector<double> theta_rad;  ///< one angle per view
+  RowExtension extension{};       ///< `columns` and `center` count the columns that it added
 
   [[nodiscard]] std::int64_t views() const { return static_cast<std::int64_t>(theta_rad.size()); }
   bool operator==(const ParallelGeometry&) const = default;

@@ -18,8 +18,10 @@ namespace vdvr {
 /// Parallel beam, as a file would describe it.
 struct ArrayScan {
   std::int64_t rows = 0, columns = 0;
-  std::vector<double> angles_deg;  ///< one per view
-  std::optional<double> center;    ///< column of the axis; none: found from the views, else the middle
+  std::vector<double> angles_deg;        ///< one per view
+  std::optional<double> center;          ///< column of the axis; none: found from the views, else the middle
+  std::optional<bool> half_acquisition;  ///< none: as axis and arc say
+  Padding padding = Padding::none;
   double pitch_u = 1, pitch_v = 1;
   std::string unit = "pixel";
   std::string name = "array";  ///< what the certificate calls the input

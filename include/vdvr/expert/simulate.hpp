@@ -55,6 +55,10 @@ VDVR_API Phantom marschner_lobb(double half_side);
 VDVR_API Phantom shepp_logan(double unit);
 /// A ball on the axis. Throws InputError unless radius > 0.
 VDVR_API Phantom sphere(double radius, double density = 1);
+/// A body of density 1 about the axis with so many pores of density 0 within +-half_height: balls of radii
+/// from 0.02 to 0.1 of the body's, apart by 0.01 of it at least. Pores are the ellipsoids behind the first;
+/// the same seed gives the same ones everywhere. Throws InputError where there is no room for them.
+VDVR_API Phantom foam(double radius, double half_height, int pores, std::uint64_t seed);
 /// Throws InputError for an empty list, a semi-axis that is not positive, or a value that is not finite.
 VDVR_API Phantom ellipsoid_list(std::vector<Ellipsoid> ellipsoids, double background, std::string name);
 /// {"ellipsoids": [{"density", "center", "semi_axes", "phi_deg"}], "background"}; phi_deg and background
@@ -83,6 +87,8 @@ struct SimulateOptions {
   double arc_deg = 180;  ///< angles k * arc / angles
   std::int64_t columns = 129, rows = 129;
   double pitch_u = 1, pitch_v = 1;
+  double detector_offset =
+      0;  ///< of parallel beam, columns by which the detector is moved towards higher ones
   std::string unit = "pixel";
   bool band_limited =
       true;  ///< 16x finer line integrals in u, ideal low-pass at the detector's Nyquist, decimation

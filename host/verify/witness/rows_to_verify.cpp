@@ -1,0 +1,109 @@
+// Deviation from extend_rows.cpp on purpose: places are counted from the detector's nearer edge, weights are
+// the integral of 30 s^2 (1 - s)^2 as a sum of powers, in long double, and each sample is gathered
+// from where it comes.
+#include "vdvr/expert/rows_to_verify.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/base/system/casts.hpp"
+#include "host/base/system/parallel.hpp"
+#include "vdvr/error.hpp"
+
+namespace vdvr {
+namespace {
+
+// Of 30 s^2 (1 - s)^2 from 0 to r.
+long double share_of_far(long double r) {
+  if (r <= 0) return 0;
+  if (r >= 1) return 1;
+  const long double cube = r * r * r;
+  return 10 * cube - 15 * cube * r + 6 * cube * r * r;
+}
+
+/// Where each sample of a longer row comes from, and times what.
+struct Source {
+  std::int64_t column = -1;  ///< of the detector; -1: nothing
+  float weight = 0;          ///< of half acquisition
+  float taper = 1;           ///< of padding
+};
+
+struct LongerRow {
+  std::vector<Source> sources;
+  std::int64_t before = 0, after = 0;
+};
+
+LongerRow longer_row(const ParallelGeometry& own, bool half, Padding padding) {
+  const std::int64_t U = own.columns;
+  const long double last_edge = static_cast<long double>(U) - 0.5L, from_first = own.center + 0.5L,
+                    from_last = last_edge - own.center;
+  const bool first_is_near = from_first <= from_last;
+  const long double near = std::min(from_first, from_last), far = std::max(from_first, from_last);
+  LongerRow row;
+  std::int64_t zeros = 0;
+  // As many as bring the nearer edge as far out as the other one.
+  while (half && near + static_cast<long double>(zeros) < far - 1e-9L) ++zeros;
+  const std::int64_t padded = padding == Padding::none ? 0 : U - U / 2;
+  row.before = half && first_is_near ? zeros : padded;
+  row.after = half && !first_is_near ? zeros : padded;
+  for (std::int64_t j = -row.before; j < U + row.after; ++j) {
+    Source s;
+    const bool beyond_first = j < 0, beyond_last = j >= U;
+    if ((beyond_first || beyond_last) && half && beyond_first == first_is_near) {
+      row.sources.push_back(s);
+      continue;
+    }
+    const std::int64_t out = beyond_first ? -j : beyond_last ? j - (U - 1) : 0;  // 1 beyond the edge
+    if (out > 0) {
+      s.taper = static_cast<float>(
+          share_of_far(1 - static_cast<long double>(out) / static_cast<long double>(padded + 1)));
+      const std::int64_t inwards = padding == Padding::mirror ? out - 1 : 0;
+      s.column = beyond_first ? inwards : U - 1 - inwards;
+    } else {
+      s.column = j;
+    }
+    const auto column = static_cast<long double>(s.column);
+    const long double from_edge = first_is_near ? column + 0.5L : last_edge - column;
+    s.weight = half ? static_cast<float>(2 * share_of_far(from_edge / (2 * near))) : 1.0f;
+    row.sources.push_back(s);
+  }
+  return row;
+}
+
+}  // namespace
+
+ProjectionSet rows_to_verify(ProjectionSet measured, const FieldOptions& field) {
+  const bool half = field.preparation.half_acquisition.value_or(false);
+  const Padding padding = field.preparation.padding;
+  ParallelGeometry& g = measured.geometry;
+  if (g.extension.before > 0 || g.extension.after > 0)
+    throw InputError("rows_to_verify: the scan's rows are longer than the detector already");
+  measured.report.preparation.half_acquisition = field.preparation.half_acquisition;
+  measured.report.preparation.padding = padding;
+  g.extension.half_acquisition = field.preparation.half_acquisition;
+  if (!half && padding == Padding::none) return measured;
+  if (measured.cone)
+    throw InputError("rows_to_verify: rows of parallel beam are made longer, not of cone beam");
+  if (field.center) g.center = *field.center;
+  if (!(g.center > -0.5 && g.center < static_cast<double>(g.columns) - 0.5))
+    throw InputError(fmt::format("centre {}: off the {} columns", g.center, g.columns));
+  const LongerRow row = longer_row(g, half, padding);
+  const std::int64_t U = g.columns, wide = std::ssize(row.sources), lines = g.views() * g.rows;
+  SampleArray longer(at(lines * wide), measured.data.scratch(), "the projections with longer rows");
+  parallel_for(lines, {}, "rows to verify", [&](std::int64_t line) {
+    for (std::int64_t j = 0; j < wide; ++j) {
+      const Source& s = row.sources[at(j)];
+      if (s.column < 0) longer[at(line * wide + j)] = 0;
+      else longer[at(line * wide + j)] = s.taper * (s.weight * measured.data[at(line * U + s.column)]);
+    }
+  });
+  measured.data = std::move(longer);
+  g.extension = {field.preparation.half_acquisition, padding, row.before, row.after, g.center};
+  g.columns = wide;
+  g.center += static_cast<double>(row.before);
+  return measured;
+}
+
+}  // namespace vdvr
