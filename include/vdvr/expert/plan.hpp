@@ -42,8 +42,9 @@ struct PlanSettings {
   std::optional<LevelTriple> coarsening{};
   bool forecast =
       true;  ///< storage, memory and time, and the paper's bounds beside ours: half of a plan's cost
-  /// Of a large scan judge by a part: some views for bounds, a window of rows for everything. What is
-  /// foreseen then are estimates, as the plan's notes say, and it cannot be built.
+  /// Of a large scan judge by a part: some views for bounds, a window of rows for everything; of any scan of
+  /// cone beam, where something is foreseen, by columns on a radius. What is foreseen then are estimates, as
+  /// the plan's notes say, and it cannot be built.
   bool estimate = false;
   /// What is foreseen is for this tolerance, no smaller than the plan's: where bricks begin that pictures
   /// then refine. None: the plan's.
