@@ -161,8 +161,7 @@ BOOST_AUTO_TEST_CASE(the_device_gives_f_of_the_longer_rows) {
     GridOptions options;
     options.size = Index3{9, 9, 2};
     const Grid grid = make_grid(scan, options);
-    const Volume volume =
-        reconstruct(device(), scan, grid, {FieldOptions{}, 32, Interpolation::cubic});
+    const Volume volume = reconstruct(device(), scan, grid, {FieldOptions{}, 32, Interpolation::cubic});
     const ExactField exact(scan, {});
     std::vector<Vec3> points;
     const Index3 n = grid.samples();
