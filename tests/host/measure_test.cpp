@@ -60,6 +60,12 @@ std::vector<TruthBox> cells_of(const MeasuredCase& c) {
   return out;
 }
 
+TruthBox middle_of(const TruthBox& b) {
+  TruthBox point;
+  for (std::size_t a = 0; a < 3; ++a) point.low[a] = point.high[a] = 0.5 * (b.low[a] + b.high[a]);
+  return point;
+}
+
 /// V + sign e on boxes within cells: between the corners' values.
 reference::RangeOn adversary(const MeasuredCase& c, double sign) {
   return [&c, sign](const TruthBox& b) {
@@ -174,6 +180,17 @@ BOOST_AUTO_TEST_CASE(an_adversary_within_the_bound_reaches_nine_tenths_of_the_vo
                    least = reference::truth_volume(cells, adversary(c, -1), everywhere, value, infinity, 3);
     BOOST_TEST(m.volume.hi >= most.lo);
     BOOST_TEST(m.volume.lo <= least.hi);
+    // The mean of a trilinear function is its value in the middle; e adds its own.
+    double v = 0, e = 0;
+    for (const TruthBox& cell : cells) {
+      const Interval up = adversary(c, 1)(middle_of(cell)), down = adversary(c, -1)(middle_of(cell));
+      v += 0.5 * (up.lo + down.lo) * cell.volume();
+      e += 0.5 * (up.lo - down.lo) * cell.volume();
+    }
+    const Interval mass = Measurement(c.volume, c.certificate).mean().integral;
+    const double lost = tolerance::fp64_sum(static_cast<std::int64_t>(cells.size()), std::abs(v) + e);
+    BOOST_TEST((mass.hi >= v + e - lost && mass.lo <= v - e + lost));
+    BOOST_TEST(mass.width() <= 2 * e * 1.001);
     // The larger end of what brute force leaves open is what the adversary surely reaches, from inside.
     BOOST_TEST(
         (most.middle() - least.middle()) >= 0.9 * m.volume.width(),
