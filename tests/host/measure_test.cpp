@@ -169,6 +169,21 @@ BOOST_AUTO_TEST_CASE(volumes_and_fractions_of_analytic_fields_lie_in_their_inter
   BOOST_TEST(open > tried / 2);
 }
 
+BOOST_AUTO_TEST_CASE(round_regions_have_their_volume) {
+  for (unsigned seed = 0; seed < 4; ++seed) {
+    const MeasuredCase c = support::measured_case(seed);
+    const double pi = std::acos(-1.0);
+    const Interval ball = Measurement(c.volume, c.certificate, {{}, {{{0.1, -0.1, 0.2}, 2, false}}, {}})
+                              .volume({0.0, {}})
+                              .region;
+    BOOST_TEST((ball.lo <= 32 * pi / 3 && 32 * pi / 3 <= ball.hi));
+    const MeasureRegion upright{
+        std::array<double, 6>{-9, -9, -1.2, 9, 9, 0.9}, {{{0.1, -0.1, 0}, 2, true}}, {}};
+    const Interval cylinder = Measurement(c.volume, c.certificate, upright).mean().region;
+    BOOST_TEST((cylinder.lo <= 2.1 * 4 * pi && 2.1 * 4 * pi <= cylinder.hi));
+  }
+}
+
 BOOST_AUTO_TEST_CASE(an_adversary_within_the_bound_reaches_nine_tenths_of_the_volume_intervals) {
   for (unsigned seed = 0; seed < 2; ++seed) {
     MeasuredCase c = support::measured_case(seed);
