@@ -125,6 +125,12 @@ Distribution measure_distribution(const Field& field, const std::vector<double>&
   out.region = outward(s.region);
   const std::vector<double> sure = s.sure.sums(), possible = s.possible.sums();
   for (std::size_t k = 0; k < edges.size(); ++k) out.at_least.push_back(outward({sure[k], possible[k]}));
+  // The volume falls as the edge rises, and so do its ends.
+  for (std::size_t k = 1; k < edges.size(); ++k) {
+    const std::size_t last = edges.size() - k;
+    out.at_least[k].hi = std::min(out.at_least[k].hi, out.at_least[k - 1].hi);
+    out.at_least[last - 1].lo = std::max(out.at_least[last - 1].lo, out.at_least[last].lo);
+  }
   for (std::size_t k = 0; k + 1 < edges.size(); ++k)
     out.within.push_back({std::max(0.0, out.at_least[k].lo - out.at_least[k + 1].hi),
                           out.at_least[k].hi - out.at_least[k + 1].lo});

@@ -237,8 +237,8 @@ BOOST_AUTO_TEST_CASE(sure_connections_and_separations_are_those_of_the_field) {
   BOOST_TEST(apart > 0);
 }
 
-BOOST_AUTO_TEST_CASE(faces_that_hold_no_point_of_the_region_join_nothing) {
-  // Two slabs that meet where the ball is not: F is above the value but for a wall between.
+BOOST_AUTO_TEST_CASE(what_connects_beyond_the_region_does_not_count) {
+  // Two slabs that meet where the ball is not: F is above the value but for a wall between them.
   MeasuredCase c = lattice_case(0.45, {}, 1);
   c.volume = support::sampled_mixed(
       c.volume.grid, 4, 8, {{0, 0, 0}, {1, 1, 1}}, 3,

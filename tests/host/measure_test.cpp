@@ -60,6 +60,12 @@ std::vector<TruthBox> cells_of(const MeasuredCase& c) {
   return out;
 }
 
+TruthBox middle_of(const TruthBox& b) {
+  TruthBox point;
+  for (std::size_t a = 0; a < 3; ++a) point.low[a] = point.high[a] = 0.5 * (b.low[a] + b.high[a]);
+  return point;
+}
+
 /// V + sign e on boxes within cells: between the corners' values.
 reference::RangeOn adversary(const MeasuredCase& c, double sign) {
   return [&c, sign](const TruthBox& b) {
@@ -146,7 +152,11 @@ BOOST_AUTO_TEST_CASE(volumes_and_fractions_of_analytic_fields_lie_in_their_inter
       BOOST_TEST(overlap(m.volume, truth), "field " << seed << ": " << m.volume.lo << " to " << m.volume.hi
                                                     << ", truth " << truth.lo << " to " << truth.hi);
       BOOST_TEST(overlap(m.region, all));
-      BOOST_TEST(overlap(m.fraction, Interval{truth.lo / all.hi, truth.hi / all.lo}));
+      // No fraction is above 1, which sums of truth may exceed by rounding.
+      BOOST_TEST(overlap(m.fraction, Interval{std::min(1.0, truth.lo / all.hi), truth.hi / all.lo}),
+                 "field " << seed << ", range " << kind << ": " << m.fraction.lo << " to " << m.fraction.hi
+                          << ", truth " << truth.lo << " to " << truth.hi << " of " << all.lo << " to "
+                          << all.hi);
       BOOST_TEST(m.region.width() <= 1e-3 * m.region.hi * (1 + 0x1p-20));
       // Of the volume a tenth of what the bound leaves open, or a thousandth: open <= width - undecided.
       BOOST_TEST(m.undecided <= std::max(1e-3 * m.volume.hi, 0.1 * (m.volume.width() - m.undecided)) + 1e-9);
@@ -157,6 +167,21 @@ BOOST_AUTO_TEST_CASE(volumes_and_fractions_of_analytic_fields_lie_in_their_inter
   }
   BOOST_TEST(tried == 3 * fields);
   BOOST_TEST(open > tried / 2);
+}
+
+BOOST_AUTO_TEST_CASE(round_regions_have_their_volume) {
+  for (unsigned seed = 0; seed < 4; ++seed) {
+    const MeasuredCase c = support::measured_case(seed);
+    const double pi = std::acos(-1.0);
+    const Interval ball = Measurement(c.volume, c.certificate, {{}, {{{0.1, -0.1, 0.2}, 2, false}}, {}})
+                              .volume({0.0, {}})
+                              .region;
+    BOOST_TEST((ball.lo <= 32 * pi / 3 && 32 * pi / 3 <= ball.hi));
+    const MeasureRegion upright{
+        std::array<double, 6>{-9, -9, -1.2, 9, 9, 0.9}, {{{0.1, -0.1, 0}, 2, true}}, {}};
+    const Interval cylinder = Measurement(c.volume, c.certificate, upright).mean().region;
+    BOOST_TEST((cylinder.lo <= 2.1 * 4 * pi && 2.1 * 4 * pi <= cylinder.hi));
+  }
 }
 
 BOOST_AUTO_TEST_CASE(an_adversary_within_the_bound_reaches_nine_tenths_of_the_volume_intervals) {
@@ -170,6 +195,17 @@ BOOST_AUTO_TEST_CASE(an_adversary_within_the_bound_reaches_nine_tenths_of_the_vo
                    least = reference::truth_volume(cells, adversary(c, -1), everywhere, value, infinity, 3);
     BOOST_TEST(m.volume.hi >= most.lo);
     BOOST_TEST(m.volume.lo <= least.hi);
+    // The mean of a trilinear function is its value in the middle; e adds its own.
+    double v = 0, e = 0;
+    for (const TruthBox& cell : cells) {
+      const Interval up = adversary(c, 1)(middle_of(cell)), down = adversary(c, -1)(middle_of(cell));
+      v += 0.5 * (up.lo + down.lo) * cell.volume();
+      e += 0.5 * (up.lo - down.lo) * cell.volume();
+    }
+    const Interval mass = Measurement(c.volume, c.certificate).mean().integral;
+    const double lost = tolerance::fp64_sum(static_cast<std::int64_t>(cells.size()), std::abs(v) + e);
+    BOOST_TEST((mass.hi >= v + e - lost && mass.lo <= v - e + lost));
+    BOOST_TEST(mass.width() <= 2 * e * 1.001);
     // The larger end of what brute force leaves open is what the adversary surely reaches, from inside.
     BOOST_TEST(
         (most.middle() - least.middle()) >= 0.9 * m.volume.width(),
@@ -199,7 +235,13 @@ BOOST_AUTO_TEST_CASE(means_and_integrals_lie_in_their_intervals) {
     MeasuredCase c = support::measured_case(seed);
     // In closed form: a box, which cuts cells.
     MeasureRegion region;
-    TruthBox box{{-2.3, -1.9, -2.7}, {1.7, 2.9, 2.2}};
+    TruthBox box;
+    const Grid& g = c.volume.grid;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double side = static_cast<double>(g.cells[a]) * g.spacing[a];
+      box.low[a] = g.origin[a] + value_in(c, 0.03, 0.4) * side;
+      box.high[a] = g.origin[a] + value_in(c, 0.5, 0.97) * side;
+    }
     region.box = {box.low[0], box.low[1], box.low[2], box.high[0], box.high[1], box.high[2]};
     const MeanMeasure m = Measurement(c.volume, c.certificate, region).mean();
     const double truth = c.field.integral(box);
@@ -296,8 +338,9 @@ BOOST_AUTO_TEST_CASE(crossings_and_widths_along_lines_hold_those_of_the_field) {
   for (unsigned seed = 0; seed < fields; ++seed) {
     MeasuredCase c = support::measured_case(seed, 2);
     const Measurement measurement(c.volume, c.certificate);
-    const Vec3 p{value_in(c, -3, -2), value_in(c, -3, 3), value_in(c, -3, 3)},
-        q{value_in(c, 2, 3), value_in(c, -3, 3), value_in(c, -3, 3)};
+    // No grid reaches less far than 2.5 from 0.
+    const Vec3 p{value_in(c, -2.4, -1.5), value_in(c, -2.4, 2.4), value_in(c, -2.4, 2.4)},
+        q{value_in(c, 1.5, 2.4), value_in(c, -2.4, 2.4), value_in(c, -2.4, 2.4)};
     const double value = value_in(c, -0.1, 0.1);
     const LineMeasure m = measurement.along(p, q, {101, value});
     const auto f = [&](double t) {
@@ -338,7 +381,7 @@ BOOST_AUTO_TEST_CASE(crossings_and_widths_along_lines_hold_those_of_the_field) {
       BOOST_TEST((run.width->lo <= to - from + 2 * step && to - from - 2 * step <= run.width->hi));
     }
   }
-  BOOST_TEST(crossings >= fields / 2);
+  BOOST_TEST(crossings >= fields / 4);
   BOOST_TEST(widths > 0u);
 }
 
