@@ -14,7 +14,7 @@
 namespace vdvr {
 namespace {
 
-// Along x and y, and along z, as far as samples of the volume are not further apart than the points.
+// Along x and y, and along z: of axes with fewer cells more than two points a cell.
 constexpr double most_across = 48, most_planes = 12;
 // Of fewer a mean says nothing.
 constexpr std::int64_t least_points = 100;
@@ -26,7 +26,7 @@ struct PointsAlong {
   std::int64_t count = 0;
 };
 PointsAlong points_along(double low, double high, double spacing, double most) {
-  const double apart = std::max(1.0, std::floor((high - low) / (most * spacing)));
+  const double apart = std::floor((high - low) / (most * spacing));
   PointsAlong p;
   p.step = spacing * (apart + 2 - std::numbers::phi);
   p.first = low + p.step / 3;
