@@ -77,6 +77,7 @@ Asked asked_of(const Arguments& args) {
   if (!asked.components) refuse(args, {"least-volume", "connect"}, "is for --components");
   if (!asked.along) refuse(args, {"samples"}, "is for --along");
   if (asked.along) refuse(args, {"between"}, "has two values; a line takes --above or --below");
+  if (asked.along) refuse(args, {"cylinder", "ball", "mask"}, "is not for --along, which --roi alone cuts");
   if (!asked.histogram) refuse(args, {"range"}, "is for --histogram");
   const int tables = int{asked.along} + int{asked.components} + int{asked.histogram};
   if (args.has("output") && tables != 1)
