@@ -1,5 +1,5 @@
-// vdvr, the command line: finds the command in the table and runs it. Called by main.cpp, and by the Python module,
-// whose wheel has the program in it.
+// vdvr, the command line: finds the command in the table and runs it. Called by main.cpp, and by the Python
+// module, whose wheel has the program in it.
 #pragma once
 
 #include <string>
