@@ -207,7 +207,7 @@ ProjectionSet load_scan_to_verify(const fs::path& path, const Arguments& args, c
   measured.preparation.half_acquisition = false;
   measured.preparation.padding = Padding::none;
   return checked(
-      rows_to_verify(load_as_stated(path, args, certificate, measured, progress), certificate.field));
+      rows_to_verify(load_as_stated(path, args, certificate, measured, progress), certificate.field), path);
 }
 
 // --- the noise of scans ---
