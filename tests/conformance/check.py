@@ -1,4 +1,4 @@
-"""Holds the program and the reader of examples/verify.py to the kit: check.py VDVR SOURCE. Called by conformance_test.cmake."""
+"""Holds the program and the reader of examples/verify.py to the kit: check.py VDVR SOURCE."""
 
 import csv
 import json

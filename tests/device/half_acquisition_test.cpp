@@ -8,6 +8,7 @@
 
 #include "host/base/system/casts.hpp"
 #include "tests/support/device.hpp"
+#include "tests/support/scans.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/expert/certify.hpp"
 #include "vdvr/expert/exact_field.hpp"
@@ -17,6 +18,7 @@
 
 using namespace vdvr;
 using support::device;
+using vdvr::testing::wanted;
 
 namespace {
 
@@ -78,13 +80,6 @@ ProjectionSet scan_of(const Turn& t, double radius) {
         scan.data.push_back(
             static_cast<float>(line_integral(discs, theta, static_cast<double>(i) - g.center)));
   return scan;
-}
-
-Preparation wanted(std::optional<bool> half, Padding padding = Padding::none) {
-  Preparation p;
-  p.half_acquisition = half;
-  p.padding = padding;
-  return p;
 }
 
 // The largest difference of F from the density, of 1, at what is covered.

@@ -18,6 +18,7 @@
 
 using namespace vdvr;
 using vdvr::testing::noise_scan;
+using vdvr::testing::wanted;
 
 namespace {
 
@@ -25,13 +26,6 @@ ProjectionSet turned(std::int64_t views, std::int64_t columns, double center, do
   ProjectionSet scan = noise_scan(views, 2, columns, 7, arc);
   scan.geometry.center = center;
   return scan;
-}
-
-Preparation wanted(std::optional<bool> half, Padding padding = Padding::none) {
-  Preparation p;
-  p.half_acquisition = half;
-  p.padding = padding;
-  return p;
 }
 
 std::string refusal(ProjectionSet scan, const Preparation& p) {

@@ -33,7 +33,23 @@ double value_in(MeasuredCase& c, double from, double to) {
   return std::uniform_real_distribution<double>(from, to)(c.random);
 }
 
-/// The same box cut along the cells of its brick, so that V is trilinear on each.
+/// A box in `count` parts along each axis.
+std::vector<TruthBox> parts_of(const TruthBox& box, const Index3& count) {
+  std::vector<TruthBox> out;
+  for (std::int64_t i = 0; i < count[0] * count[1] * count[2]; ++i) {
+    TruthBox part;
+    const Index3 at{i % count[0], i / count[0] % count[1], i / (count[0] * count[1])};
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double side = (box.high[a] - box.low[a]) / static_cast<double>(count[a]);
+      part.low[a] = box.low[a] + static_cast<double>(at[a]) * side;
+      part.high[a] = part.low[a] + side;
+    }
+    out.push_back(part);
+  }
+  return out;
+}
+
+/// Bricks cut along their cells, so that V is trilinear on each.
 std::vector<TruthBox> cells_of(const MeasuredCase& c) {
   std::vector<TruthBox> out;
   const Index3 n = c.volume.bricks();
@@ -44,18 +60,7 @@ std::vector<TruthBox> cells_of(const MeasuredCase& c) {
     for (std::size_t a = 0; a < 3; ++a)
       count[a] = std::lround(std::ldexp((box.high[a] - box.low[a]) / c.volume.grid.spacing[a],
                                         l[2 - a] - c.volume.coarsening[2 - a]));
-    for (std::int64_t z = 0; z < count[2]; ++z)
-      for (std::int64_t y = 0; y < count[1]; ++y)
-        for (std::int64_t x = 0; x < count[0]; ++x) {
-          TruthBox cell;
-          const Index3 j{x, y, z};
-          for (std::size_t a = 0; a < 3; ++a) {
-            const double side = (box.high[a] - box.low[a]) / static_cast<double>(count[a]);
-            cell.low[a] = box.low[a] + static_cast<double>(j[a]) * side;
-            cell.high[a] = cell.low[a] + side;
-          }
-          out.push_back(cell);
-        }
+    std::ranges::copy(parts_of(box, count), std::back_inserter(out));
   }
   return out;
 }
@@ -257,14 +262,7 @@ BOOST_AUTO_TEST_CASE(means_and_integrals_lie_in_their_intervals) {
     const support::MeasuredPlace where = support::measured_place(c, seed);
     double lo = 0, hi = 0;
     for (const TruthBox& brick : c.bricks())
-      for (int i = 0; i < 4096; ++i) {
-        TruthBox part;
-        const Index3 at{i % 16, i / 16 % 16, i / 256};
-        for (std::size_t a = 0; a < 3; ++a) {
-          const double side = (brick.high[a] - brick.low[a]) / 16;
-          part.low[a] = brick.low[a] + static_cast<double>(at[a]) * side;
-          part.high[a] = part.low[a] + side;
-        }
+      for (const TruthBox& part : parts_of(brick, {16, 16, 16})) {
         const int in = where.place(part);
         if (in < 0) continue;
         const Interval range = c.field.range(part);
@@ -286,14 +284,7 @@ BOOST_AUTO_TEST_CASE(extremes_lie_in_their_intervals) {
     const ExtremesMeasure m = Measurement(c.volume, c.certificate, where.region).extremes();
     Interval least{infinity, infinity}, largest{-infinity, -infinity};
     for (const TruthBox& brick : c.bricks())
-      for (int i = 0; i < 4096; ++i) {
-        TruthBox part;
-        const Index3 at{i % 16, i / 16 % 16, i / 256};
-        for (std::size_t a = 0; a < 3; ++a) {
-          const double side = (brick.high[a] - brick.low[a]) / 16;
-          part.low[a] = brick.low[a] + static_cast<double>(at[a]) * side;
-          part.high[a] = part.low[a] + side;
-        }
+      for (const TruthBox& part : parts_of(brick, {16, 16, 16})) {
         const int in = where.place(part);
         if (in < 0) continue;
         const Interval range = c.field.range(part);

@@ -1,4 +1,4 @@
-"""Runs the Python of docs/file-format.md on files of ours: DOCUMENT VDVR. Called by recipes_test.cmake."""
+"""Runs the Python of docs/file-format.md on files of ours: DOCUMENT VDVR."""
 
 import re
 import subprocess

@@ -1,5 +1,4 @@
-"""What examples/verify.py says of files of many kinds, and of forgeries of them: VDVR SOURCE. Called by
-second_verifier_test.cmake. A forgery is hashed and sealed again, so that only the comparison with F can find it."""
+"""What examples/verify.py says of files of many kinds, and of forgeries of them: VDVR SOURCE. A forgery is hashed and sealed again, so that only the comparison with F can find it."""
 
 import importlib.util
 import json

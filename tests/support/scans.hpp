@@ -13,6 +13,14 @@
 
 namespace vdvr::testing {
 
+/// Of the steps of preparation, how rows are made longer.
+inline Preparation wanted(std::optional<bool> half, Padding padding = Padding::none) {
+  Preparation p;
+  p.half_acquisition = half;
+  p.padding = padding;
+  return p;
+}
+
 inline ProjectionSet empty_scan(std::int64_t views, std::int64_t rows, std::int64_t columns,
                                 double arc_deg = 180) {
   ProjectionSet scan;

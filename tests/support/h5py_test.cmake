@@ -1,0 +1,11 @@
+# TEST: runs SCRIPT with WORDS, "|" between, by a Python that has h5py. Skipped by name where that cannot be had.
+include("${CMAKE_CURRENT_LIST_DIR}/h5py.cmake")
+find_h5py(${TEST})
+if(NOT python)
+  return()
+endif()
+string(REPLACE "|" ";" words "${WORDS}")
+execute_process(COMMAND "${python}" "${SCRIPT}" ${words} RESULT_VARIABLE code)
+if(NOT code EQUAL 0)
+  message(FATAL_ERROR "${SCRIPT} failed with ${code}")
+endif()
