@@ -90,3 +90,14 @@ BOOST_AUTO_TEST_CASE(a_program_that_ends_without_unwinding_leaves_none_of_them) 
   io::remove_temporaries();
   BOOST_TEST(names_in(folder.path()).empty());
 }
+
+// A folder of ours and the journal in it, as `run` has them in its first minutes.
+BOOST_AUTO_TEST_CASE(a_folder_goes_after_what_lies_in_it) {
+  const TemporaryFolder folder;
+  fs::create_directory(folder / "out");
+  io::note_temporary(folder / "out");
+  io::write_file(folder / "out" / "volume.vdvr.journal", "");
+  io::note_temporary(folder / "out" / "volume.vdvr.journal");
+  io::remove_temporaries();
+  BOOST_TEST(names_in(folder.path()).empty());
+}

@@ -210,7 +210,9 @@ void remove_temporaries() {
   const std::lock_guard guard(all.lock);
   std::error_code ignored;
   for (const auto& path : all.trees) std::filesystem::remove_all(path, ignored);
-  for (const auto& path : all.paths) std::filesystem::remove(path, ignored);
+  // Backwards: what lies in a folder comes after it, and must go before it.
+  for (auto path = all.paths.rbegin(); path != all.paths.rend(); ++path)
+    std::filesystem::remove(*path, ignored);
   all.trees.clear();
   all.paths.clear();
 }
