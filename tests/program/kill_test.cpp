@@ -201,7 +201,8 @@ BOOST_AUTO_TEST_CASE(build_killed_again_and_again_gets_there) {
   for (int i = 0; i < 4 && !done; ++i) {
     const pid_t child = start(w.build("--resume"), w.messages);
     kill_after(child, slice);
-    done = finish(child) == 0;
+    // Killed when all was in place, it left nothing to resume.
+    done = finish(child) == 0 || (fs::exists(w.volume()) && !fs::exists(w.journal()));
     w.nothing_is_half_written();
   }
   if (!done) BOOST_TEST(w.run(w.build("--resume")) == 0, w.said());
