@@ -229,10 +229,10 @@ void add_head_figure(Report& run, const TestScan& test, const Case& mixed) {
 }
 
 void add_head_thresholds(Report& run, const TestScan& test, const Case& at3, const Case& paper3) {
-  struct Published {
+  struct Threshold {
     double epsilon, storage, fps;
   };
-  constexpr Published published[] = {{0.03, 2.41, 12}, {0.025, 3.03, 11}, {0.02, 4.23, 8.6}};
+  constexpr Threshold published[] = {{0.03, 2.41, 12}, {0.025, 3.03, 11}, {0.02, 4.23, 8.6}};
   Table table{
       "table-2-head",
       "The head at carp size; storage in samples per base sample, all of the volume (interior in brackets)",
@@ -244,7 +244,7 @@ void add_head_thresholds(Report& run, const TestScan& test, const Case& at3, con
     return fmt::format("{:.2f} ({:.2f})", storage_of(c.volume, false).samples_ratio,
                        storage_of(c.volume, true).samples_ratio);
   };
-  for (const Published& p : published) {
+  for (const Threshold& p : published) {
     if (run.quick && p.epsilon != 0.03) continue;
     std::optional<Case> made, paper_made;
     if (p.epsilon != 0.03) {

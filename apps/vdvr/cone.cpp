@@ -4,16 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <nlohmann/json.hpp>
 
+#include "apps/vdvr/understood.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/rtk_geometry.hpp"
 
 namespace vdvr::cli {
 namespace {
-
-constexpr double degrees = 180 / std::numbers::pi;
 
 /// The smallest and the largest over all views.
 struct Span {
@@ -91,11 +89,11 @@ Json cone_json(const ProjectionSet& scan) {
                {"pitch_v_at_axis", span_json(s.pitch_v)},
                {"center", span_json(s.center)},
                {"row", span_json(s.row)},
-               {"half_fan_deg", s.half_fan * degrees},
-               {"half_cone_deg", s.half_cone * degrees},
-               {"arc_deg", arc.arc_rad * degrees},
-               {"in_plane_deg", span_json(s.in_plane, degrees)},
-               {"out_of_plane_deg", span_json(s.out_of_plane, degrees)},
+               {"half_fan_deg", s.half_fan * degrees_per_radian},
+               {"half_cone_deg", s.half_cone * degrees_per_radian},
+               {"arc_deg", arc.arc_rad * degrees_per_radian},
+               {"in_plane_deg", span_json(s.in_plane, degrees_per_radian)},
+               {"out_of_plane_deg", span_json(s.out_of_plane, degrees_per_radian)},
                {"redundancy", text_of(scan.cone->redundancy)},
                {"matrices", matrices_json(*scan.cone)}};
   if (const double detector = scan.report.source_to_detector; detector > 0) {
@@ -115,13 +113,13 @@ void print_cone(const ProjectionSet& scan) {
   fmt::print("\n  at the axis  pitch {} x {} {}, isocentre at column {} and row {}\n", span_text(s.pitch_u),
              span_text(s.pitch_v), unit, span_text(s.center), span_text(s.row));
   fmt::print("  angles       half fan {:.2f}, half cone {:.2f}, arc {:.2f} degrees ({})\n",
-             s.half_fan * degrees, s.half_cone * degrees, source_arc(*scan.cone).arc_rad * degrees,
-             text_of(scan.cone->redundancy));
+             s.half_fan * degrees_per_radian, s.half_cone * degrees_per_radian,
+             source_arc(*scan.cone).arc_rad * degrees_per_radian, text_of(scan.cone->redundancy));
   const double largest = std::max({std::abs(s.in_plane.low), std::abs(s.in_plane.high),
                                    std::abs(s.out_of_plane.low), std::abs(s.out_of_plane.high)});
   if (largest > 1e-9)
-    fmt::print("  tilt         in plane {}, out of plane {} degrees\n", span_text(s.in_plane, degrees),
-               span_text(s.out_of_plane, degrees));
+    fmt::print("  tilt         in plane {}, out of plane {} degrees\n",
+               span_text(s.in_plane, degrees_per_radian), span_text(s.out_of_plane, degrees_per_radian));
 }
 
 }  // namespace vdvr::cli

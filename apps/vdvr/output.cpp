@@ -46,9 +46,8 @@ Json geometry_json(const ParallelGeometry& rows) {
                         {"columns_before", rows.extension.before},
                         {"columns_after", rows.extension.after}};
   if (!g.theta_rad.empty()) {
-    constexpr double degrees = 57.29577951308232;
-    j["first_angle_deg"] = g.theta_rad.front() * degrees;
-    j["last_angle_deg"] = g.theta_rad.back() * degrees;
+    j["first_angle_deg"] = g.theta_rad.front() * degrees_per_radian;
+    j["last_angle_deg"] = g.theta_rad.back() * degrees_per_radian;
   }
   return j;
 }

@@ -383,10 +383,9 @@ std::string input(const RunReport& run) {
   add(pairs, run.scan.cone ? "pitch at the axis" : "pitch",
       escaped(fmt::format("{:.6g} \xC3\x97 {:.6g} {}", g.pitch_u, g.pitch_v, g.unit)));
   if (!g.theta_rad.empty()) {
-    constexpr double degrees = 57.29577951308232;
     add(pairs, "first and last angle",
-        fmt::format("{:.6g}\xC2\xB0 and {:.6g}\xC2\xB0", g.theta_rad.front() * degrees,
-                    g.theta_rad.back() * degrees));
+        fmt::format("{:.6g}\xC2\xB0 and {:.6g}\xC2\xB0", g.theta_rad.front() * degrees_per_radian,
+                    g.theta_rad.back() * degrees_per_radian));
   }
   add(pairs, "centre", fmt::format("column {:.4f} ({})", g.center, escaped(r.center_source)));
   if (run.scan.cone) add_cone(run.scan, pairs);

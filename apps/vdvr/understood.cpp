@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <nlohmann/json.hpp>
 
 #include "apps/common/messages.hpp"
@@ -15,8 +14,6 @@
 
 namespace vdvr::cli {
 namespace {
-
-constexpr double degrees = 180 / std::numbers::pi;
 
 /// How the angles follow each other.
 struct Turn {
@@ -33,13 +30,13 @@ Turn turn_of(const std::vector<double>& theta_rad) {
   Turn t;
   if (theta_rad.empty()) return t;
   const auto [low, high] = std::minmax_element(theta_rad.begin(), theta_rad.end());
-  t.first = theta_rad.front() * degrees;
-  t.last = theta_rad.back() * degrees;
-  t.low = *low * degrees;
-  t.high = *high * degrees;
+  t.first = theta_rad.front() * degrees_per_radian;
+  t.last = theta_rad.back() * degrees_per_radian;
+  t.low = *low * degrees_per_radian;
+  t.high = *high * degrees_per_radian;
   std::int64_t up = 0, down = 0;
   for (std::size_t k = 1; k < theta_rad.size(); ++k) {
-    const double step = (theta_rad[k] - theta_rad[k - 1]) * degrees;
+    const double step = (theta_rad[k] - theta_rad[k - 1]) * degrees_per_radian;
     t.least_step = k == 1 ? step : std::min(t.least_step, step);
     t.largest_step = k == 1 ? step : std::max(t.largest_step, step);
     up += step > 0 ? 1 : 0;
@@ -90,10 +87,11 @@ Json understood_json(const ProjectionSet& scan, const Understood& r) {
   const Turn t = turn_of(scan.geometry.theta_rad);
   Json frames = Json::array(), assumptions = Json::array();
   for (const NamedView& f : r.frames)
-    frames.push_back({{"view", f.view},
-                      {"projection", f.projection},
-                      {"name", f.name},
-                      {"angle_deg", scan.geometry.theta_rad.at(static_cast<std::size_t>(f.view)) * degrees}});
+    frames.push_back(
+        {{"view", f.view},
+         {"projection", f.projection},
+         {"name", f.name},
+         {"angle_deg", scan.geometry.theta_rad.at(static_cast<std::size_t>(f.view)) * degrees_per_radian}});
   for (const Assumption& a : assumed(scan, r))
     assumptions.push_back({{"what", a.what}, {"why", a.why}, {"otherwise", with_options(a.otherwise)}});
   return {{"values", text_of(r.values)},
@@ -127,7 +125,7 @@ void print_understood(const ProjectionSet& scan, const Understood& r) {
                f.view == 0                    ? "first view"
                : f.view == 1 && g.views() > 2 ? "second view"
                                               : "last view",
-               g.theta_rad[static_cast<std::size_t>(f.view)] * degrees, f.name);
+               g.theta_rad[static_cast<std::size_t>(f.view)] * degrees_per_radian, f.name);
   for (const Assumption& a : assumed(scan, r))
     fmt::print("  assumed      {}: {}; {} say otherwise\n", a.what, a.why, with_options(a.otherwise));
 }

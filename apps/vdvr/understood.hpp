@@ -2,11 +2,15 @@
 // view, what was assumed and how to say otherwise. Called by info, run and whatever else reads a scan.
 #pragma once
 
+#include <numbers>
+
 #include "apps/common/common_options.hpp"
 #include "vdvr/expert/projections.hpp"
 #include "vdvr/expert/understood.hpp"
 
 namespace vdvr::cli {
+
+inline constexpr double degrees_per_radian = 180 / std::numbers::pi;
 
 Json understood_json(const ProjectionSet& scan, const Understood& understood);
 /// With `understood`, what was understood too.

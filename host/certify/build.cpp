@@ -210,16 +210,16 @@ std::uint64_t memory_bytes(const MixedVolume& volume) {
 }
 
 // What a measured volume is certified for, and whether that will do.
-struct Verdict {
+struct Judgement {
   Certificate certificate{};
   std::optional<NodeTolerance> smaller{};  // what it is to be brought within
   bool refined = false;                    // bricks are to be classified anew, for what was asked of them
 };
-using Judge = std::function<Verdict(const Measured&)>;
+using Judge = std::function<Judgement(const Measured&)>;
 
 struct Judged {
   MixedVolume volume{};
-  Verdict verdict{};
+  Judgement verdict{};
 };
 
 // Those that a smaller tolerance may ask more of than the one they were measured with.
@@ -268,7 +268,7 @@ Judged close_and_measure(const Inputs& in, ClassifyBricks& test, OpenBricks& bri
       out.volume = std::move(volume);
       out.bricks = test.measures();
       out.slack = test.bounds();
-      Verdict verdict = judge(out);
+      Judgement verdict = judge(out);
       if (!verdict.smaller) return {std::move(out.volume), std::move(verdict)};
       volume = std::move(out.volume);
       tolerance = std::move(*verdict.smaller);
@@ -348,9 +348,9 @@ struct VolumeMaker {
     }
   }
 
-  Verdict judge(const Measured& measured) {
+  Judgement judge(const Measured& measured) {
     const SamplerTerms sampler = samplers.of(measured.volume);
-    Verdict verdict{fill_certificate(in, device, scan, filtered, options, measured, sampler, epsilon_abs)};
+    Judgement verdict{fill_certificate(in, device, scan, filtered, options, measured, sampler, epsilon_abs)};
     const double rest = samplers.beside_nodes(sampler);
     const bool by_brick = refinement && refinement->knows_bricks();
     const bool asked =

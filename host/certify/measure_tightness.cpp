@@ -17,14 +17,14 @@
 namespace vdvr {
 namespace {
 
-constexpr int granularity = 4;
+constexpr int cells_a_brick = 4;
 constexpr std::size_t bricks_by_bound = 12, bricks_by_chance = 24;
 
 // What T may be in every brick that may hold a covered node; negative elsewhere.
 std::vector<float> brick_bounds(opencl::State& state, GoldStream& stream, const Volume& base,
                                 const Progress& progress) {
   const auto near = stream.bricks_near_coverage();
-  const DeviceField field(state, as_mixed(base, granularity));
+  const DeviceField field(state, as_mixed(base, cells_a_brick));
   const opencl::DeviceArray<std::uint8_t> selected(state, std::span<const std::uint8_t>(near), "bricks");
   std::vector<float> out(near.size(), -1);
   // Beside interpolation and rounding.
@@ -114,7 +114,7 @@ Tightness measure_in_units(Device& device, const ScanInUnits& from, const Grid& 
   PreparedScan prepared(state, from, field, PreparedScan::Sups::of_derivatives, progress);
   const bool cone = from.scan.cone.has_value();
   const auto stream_at = [&](const Rates& r) {
-    const GoldSettings settings = gold_settings(grid, granularity, r);
+    const GoldSettings settings = gold_settings(grid, cells_a_brick, r);
     return GoldStream(state, prepared.filtered, prepared.sups, settings, prepared.source(settings));
   };
   // Of cone beam there is one way to gold.

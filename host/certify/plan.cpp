@@ -34,7 +34,7 @@
 namespace vdvr {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 const std::vector<int> bound_rates{1, 2, 4, 8, 16, 32};
 
 void check_granularity(int granularity) {

@@ -34,14 +34,14 @@ struct Name {
   ExportFormat format;
   const char* text;
 };
-constexpr std::array<Name, 8> names{{{ExportFormat::mha, "mha"},
-                                     {ExportFormat::nrrd, "nrrd"},
-                                     {ExportFormat::npy, "npy"},
-                                     {ExportFormat::raw, "raw"},
-                                     {ExportFormat::tiff, "tiff"},
-                                     {ExportFormat::hdf5, "hdf5"},
-                                     {ExportFormat::ome_zarr, "ome-zarr"},
-                                     {ExportFormat::vtm, "vtm"}}};
+constexpr std::array<Name, 8> format_names{{{ExportFormat::mha, "mha"},
+                                            {ExportFormat::nrrd, "nrrd"},
+                                            {ExportFormat::npy, "npy"},
+                                            {ExportFormat::raw, "raw"},
+                                            {ExportFormat::tiff, "tiff"},
+                                            {ExportFormat::hdf5, "hdf5"},
+                                            {ExportFormat::ome_zarr, "ome-zarr"},
+                                            {ExportFormat::vtm, "vtm"}}};
 
 /// "slices/" and "slices" name one folder.
 fs::path without_slash(const fs::path& path) { return path.has_filename() ? path : path.parent_path(); }
@@ -229,7 +229,7 @@ void check_options(const fs::path& path, const ExportOptions& o) {
 }  // namespace
 
 const char* text_of(ExportFormat format) {
-  for (const Name& name : names)
+  for (const Name& name : format_names)
     if (name.format == format) return name.text;
   return "?";
 }

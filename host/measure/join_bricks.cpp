@@ -9,7 +9,7 @@
 namespace vdvr::measured {
 namespace {
 
-constexpr int unit = 6;  // log2 of the finest cells per cell of the grid
+constexpr int finest = 6;  // log2 of the finest cells per cell of the grid
 
 struct Range {
   std::int64_t first = 0, last = -1;
@@ -22,8 +22,8 @@ struct AxisTouch {
 };
 
 AxisTouch side_by_side(const LabelledBrick& a, const LabelledBrick& b, std::size_t axis) {
-  const std::int64_t p = std::int64_t{1} << (unit - a.per_cell[axis]),
-                     q = std::int64_t{1} << (unit - b.per_cell[axis]), last = b.count[axis] - 1;
+  const std::int64_t p = std::int64_t{1} << (finest - a.per_cell[axis]),
+                     q = std::int64_t{1} << (finest - b.per_cell[axis]), last = b.count[axis] - 1;
   AxisTouch out{0, a.count[axis], {}, {}};
   for (std::int64_t i = 0; i < a.count[axis]; ++i) {
     const std::int64_t low = i * p, high = low + p;

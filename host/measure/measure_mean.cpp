@@ -10,7 +10,6 @@
 namespace vdvr::measured {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 // Cut cells are halved so often at most: twice a side.
 constexpr int cut_halvings = 6;
 

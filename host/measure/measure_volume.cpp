@@ -10,7 +10,6 @@
 namespace vdvr::measured {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 // What geometry may leave undecided beside what the bound leaves open: it makes intervals that much wider.
 constexpr double open_share = 0.1;
 // This share of what may stay undecided is aimed at: one pass mostly does, since parts are halved a little

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <limits>
 #include <vector>
 
 #include "host/base/system/parallel.hpp"
@@ -10,6 +11,8 @@
 #include "vdvr/expert/mixed_volume.hpp"
 
 namespace vdvr::measured {
+
+inline constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// A brick's samples as float, and where its cells lie.
 struct BrickCells {

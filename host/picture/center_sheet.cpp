@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "host/picture/canvas.hpp"
+#include "host/picture/sheet.hpp"
 #include "host/picture/text.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/extend_rows.hpp"
@@ -123,10 +124,8 @@ ProjectionSet with_center(const ProjectionSet& row, double center) {
 
 // --- drawing ---
 
-constexpr Colour kPaper{255, 255, 255}, kInk{20, 20, 20}, kGrid{215, 215, 215}, kMark{215, 80, 20},
-    kCurve{0, 90, 180};
-constexpr std::int64_t kAcross = 5, kEdge = 14, kGap = 8, kLine = 24, kChart = 260;
-constexpr double kText = 16;
+constexpr Colour kMark{215, 80, 20};
+constexpr std::int64_t kAcross = 5, kGap = 8, kLine = 24, kChart = 260;
 
 void centred_text(Image& image, std::int64_t x, std::int64_t y, const std::string& text, const Colour& c) {
   draw_text(image, static_cast<double>(x) - text_width(text, kText) / 2, static_cast<double>(y), text, kText,

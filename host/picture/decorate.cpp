@@ -17,7 +17,7 @@
 namespace vdvr {
 namespace {
 
-constexpr Colour kInk{235, 235, 235}, kShadow{0, 0, 0}, kEdge{200, 205, 215};
+constexpr Colour kLetters{235, 235, 235}, kShadow{0, 0, 0}, kRim{200, 205, 215};
 
 /// Letters with a dark rim, legible on any picture.
 void label(Image& image, double x, double top, const std::string& s, double size, const Colour& c) {
@@ -111,9 +111,9 @@ void draw_box(Image& image, const Camera& camera, const Grid& grid, const std::v
         const auto visible = in_front(view, {from, to}, near);
         if (!visible) continue;
         const glm::dvec2 p = view.pixel(visible->a), q = view.pixel(visible->b);
-        if (front) draw_line(image, p, q, 1.2, kEdge, [](std::int64_t, std::int64_t) { return 0.9; });
+        if (front) draw_line(image, p, q, 1.2, kRim, [](std::int64_t, std::int64_t) { return 0.9; });
         else
-          draw_line(image, p, q, 1.0, kEdge,
+          draw_line(image, p, q, 1.0, kRim,
                     [&](std::int64_t x, std::int64_t y) { return 0.6 * shows(x, y); });
       }
 }
@@ -172,7 +172,7 @@ void draw_colour_bar(Image& image, const ColourBar& bar, std::int64_t above) {
                     unit = power + (power.empty() || bar.unit.empty() ? "" : " ") + bar.unit;
   const std::int64_t top = margin + (unit.empty() ? std::lround(cap / 2) : std::lround(1.4 * line));
   const std::int64_t x = image.width - 2 * margin - std::lround(widest) - width;
-  fill(image, x - 1, top - 1, width + 2, height + 2, kInk);
+  fill(image, x - 1, top - 1, width + 2, height + 2, kLetters);
   std::optional<glm::dvec2> before;
   const double most =
       std::max_element(bar.points.begin(), bar.points.end(), [](const auto& a, const auto& b) {
@@ -195,12 +195,12 @@ void draw_colour_bar(Image& image, const ColourBar& bar, std::int64_t above) {
   }
   if (!unit.empty())
     label(image, static_cast<double>(image.width - margin) - text_width(unit, size),
-          static_cast<double>(margin), unit, size, kInk);
+          static_cast<double>(margin), unit, size, kLetters);
   for (const Tick& t : ticks.ticks) {
     const double part = hi > lo ? (t.value - lo) / (hi - lo) : 0.5;
     const double y = static_cast<double>(top) + (1 - part) * static_cast<double>(height - 1);
-    fill(image, x + width + 1, std::lround(y), 3, 1, kInk);
-    label(image, static_cast<double>(x + width + margin), y - cap / 2, t.label, size, kInk);
+    fill(image, x + width + 1, std::lround(y), 3, 1, kLetters);
+    label(image, static_cast<double>(x + width + margin), y - cap / 2, t.label, size, kLetters);
   }
 }
 
@@ -214,7 +214,7 @@ std::int64_t draw_caption(Image& image, const std::vector<std::string>& paragrap
   for (std::size_t i = 0; i < text.lines.size(); ++i)
     draw_text(image, static_cast<double>(text.margin),
               static_cast<double>(top + text.margin) + static_cast<double>(i) * line_height(text.size),
-              text.lines[i], text.size, kInk);
+              text.lines[i], text.size, kLetters);
   return text.height;
 }
 

@@ -19,7 +19,7 @@
 namespace vdvr {
 namespace {
 
-constexpr Colour kPaper{24, 24, 24}, kInk{230, 230, 230}, kNotCompared{64, 64, 64};
+constexpr Colour kDark{24, 24, 24}, kLight{230, 230, 230}, kNotCompared{64, 64, 64};
 constexpr Colour kAbove{0, 255, 255};  // above the tolerance: a hue that the map does not have
 constexpr std::int64_t kMargin = 8, kBar = 10;
 
@@ -125,8 +125,8 @@ void draw_caption(Image& image, const std::string& high, const std::string& line
   const auto above = static_cast<double>(top);
   const std::int64_t left = 2 * kMargin + std::lround(text_width(low, small));
   const std::int64_t right = image.width - 2 * kMargin - std::lround(text_width(high, small));
-  draw_text(image, kMargin, above, low, small, kInk);
-  draw_text(image, static_cast<double>(right + kMargin), above, high, small, kInk);
+  draw_text(image, kMargin, above, low, small, kLight);
+  draw_text(image, static_cast<double>(right + kMargin), above, high, small, kLight);
   for (std::int64_t x = left; x < right; ++x)
     fill(image, x, top, 1, kBar,
          error_colour(static_cast<double>(x - left) / static_cast<double>(right - left - 1)));
@@ -134,12 +134,12 @@ void draw_caption(Image& image, const std::string& high, const std::string& line
   const double size = std::clamp(text_size(image), small, 15.0);
   draw_text(image, kMargin, above + kBar + 7,
             text_width(line, size) <= room ? line : fitted(line, room, small),
-            text_width(line, size) <= room ? size : small, kInk);
+            text_width(line, size) <= room ? size : small, kLight);
 }
 
 ErrorSlice empty_slice(const SlicePlace& place) {
   ErrorSlice s;
-  s.image = blank(place.width, place.height, kPaper);
+  s.image = blank(place.width, place.height, kDark);
   s.errors = {place.width, place.height, {}};
   s.errors.values.assign(static_cast<std::size_t>(place.width * place.height),
                          std::numeric_limits<float>::quiet_NaN());
@@ -327,7 +327,7 @@ ErrorSlice bound_slice(const MixedVolume& volume, const Certificate& c, bool ima
 }
 
 Image bound_picture(const FloatImage& shown, double end, BrickQuantity quantity) {
-  Image image = blank(shown.width, shown.height + kErrorCaption, kPaper);
+  Image image = blank(shown.width, shown.height + kErrorCaption, kDark);
   double most = 0;
   for (std::int64_t i = 0; i < shown.width * shown.height; ++i) {
     const float value = shown.values[static_cast<std::size_t>(i)];

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "host/picture/canvas.hpp"
+#include "host/picture/sheet.hpp"
 #include "host/picture/text.hpp"
 #include "host/picture/ticks.hpp"
 #include "vdvr/error.hpp"
@@ -15,10 +16,8 @@
 namespace vdvr {
 namespace {
 
-constexpr Colour kPaper{255, 255, 255}, kInk{20, 20, 20}, kAside{150, 150, 150}, kGrid{215, 215, 215},
-    kCurve{0, 90, 180};
-constexpr std::int64_t kEdge = 14, kLine = 22, kCapital = 12, kBar = 14, kCurves = 90, kTicks = 74;
-constexpr double kText = 16;
+constexpr Colour kAside{150, 150, 150};
+constexpr std::int64_t kTextLine = 22, kCapital = 12, kScale = 14, kCurves = 90, kTicks = 74;
 
 /// Blue below, white at 0, red above; -1 to 1.
 Colour signed_colour(double x) {
@@ -38,7 +37,7 @@ void write(Image& image, std::int64_t x, std::int64_t y, const std::string& text
 
 struct Layout {
   std::int64_t columns, views, zoom_x, zoom_y;
-  std::int64_t left = kEdge + kTicks, top = kEdge + 2 * kLine;
+  std::int64_t left = kEdge + kTicks, top = kEdge + 2 * kTextLine;
   [[nodiscard]] std::int64_t width() const { return columns * zoom_x; }
   [[nodiscard]] std::int64_t height() const { return views * zoom_y; }
 };
@@ -80,16 +79,16 @@ void draw_rays(Image& image, const Layout& l, const Residual& r, std::int64_t ro
 void draw_scale(Image& image, const Layout& l, double scale, const std::string& unit) {
   const std::int64_t x = l.left + l.width() + kEdge + kCurves + 2 * kEdge;
   for (std::int64_t y = 0; y < l.height(); ++y)
-    fill(image, x, l.top + y, kBar, 1,
+    fill(image, x, l.top + y, kScale, 1,
          signed_colour(1 - 2 * static_cast<double>(y) / static_cast<double>(l.height() - 1)));
   const auto label = [&](std::int64_t y, double value) {
-    write(image, x + kBar + 6, y, fmt::format("{:+.3g}", value));
+    write(image, x + kScale + 6, y, fmt::format("{:+.3g}", value));
   };
   label(l.top, scale);
-  write(image, x + kBar + 6, l.top + l.height() / 2 - kCapital / 2, "0");
+  write(image, x + kScale + 6, l.top + l.height() / 2 - kCapital / 2, "0");
   label(l.top + l.height() - kCapital, -scale);
   write(image, x, l.top + l.height() + kEdge, "density");
-  write(image, x, l.top + l.height() + kEdge + kLine, "× " + unit);
+  write(image, x, l.top + l.height() + kEdge + kTextLine, "× " + unit);
 }
 
 /// Curves of rms from 0: by view to the right of the rays, by column below.
@@ -106,17 +105,17 @@ void draw_curves(Image& image, const Layout& l, const ResidualSummary& s) {
   for (std::int64_t i = 0; i < l.columns; ++i)
     fill(image, l.left + i * l.zoom_x, below, l.zoom_x,
          length(s.columns[static_cast<std::size_t>(i)].rms, s.worst_column.rms), kCurve);
-  write(image, right, l.top - kLine, fmt::format("rms, {:.2g}", s.worst_view.rms));
+  write(image, right, l.top - kTextLine, fmt::format("rms, {:.2g}", s.worst_view.rms));
   write(image, kEdge, below, "rms");
-  write(image, kEdge, below + kLine, fmt::format("{:.2g}", s.worst_column.rms));
+  write(image, kEdge, below + kTextLine, fmt::format("{:.2g}", s.worst_column.rms));
 }
 
 void draw_ticks(Image& image, const Layout& l) {
   write(image, kEdge, l.top, "view 0");
   write(image, kEdge, l.top + l.height() - kCapital, fmt::format("{}", l.views - 1));
-  write(image, l.left, l.top - kLine, "column 0");
+  write(image, l.left, l.top - kTextLine, "column 0");
   const std::string last = fmt::format("{}", l.columns - 1);
-  write(image, l.left + l.width() - std::lround(text_width(last, kText)), l.top - kLine, last);
+  write(image, l.left + l.width() - std::lround(text_width(last, kText)), l.top - kTextLine, last);
 }
 
 }  // namespace
@@ -142,8 +141,8 @@ Image residual_picture(const Residual& r, const ResidualSummary& s, std::int64_t
   double longest = text_width(title, kText);
   for (const std::string& line : caption) longest = std::max(longest, text_width(line, kText));
   Image image = blank(
-      std::max(l.left + l.width() + 4 * kEdge + kCurves + kBar + numbers, std::lround(longest) + 2 * kEdge),
-      l.top + l.height() + 3 * kEdge + kCurves + 3 * kLine, kPaper);
+      std::max(l.left + l.width() + 4 * kEdge + kCurves + kScale + numbers, std::lround(longest) + 2 * kEdge),
+      l.top + l.height() + 3 * kEdge + kCurves + 3 * kTextLine, kPaper);
   write(image, kEdge, kEdge, title);
   draw_rays(image, l, r, row, scale);
   draw_curves(image, l, s);
@@ -152,7 +151,7 @@ Image residual_picture(const Residual& r, const ResidualSummary& s, std::int64_t
   std::int64_t y = l.top + l.height() + 2 * kEdge + kCurves;
   for (const std::string& line : caption) {
     write(image, kEdge, y, line);
-    y += kLine;
+    y += kTextLine;
   }
   return image;
 }

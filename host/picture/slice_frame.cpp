@@ -14,7 +14,7 @@
 namespace vdvr {
 namespace {
 
-constexpr Colour kPaper{255, 255, 255}, kInk{25, 25, 25};
+constexpr Colour kFrame{255, 255, 255}, kFrameInk{25, 25, 25};
 
 /// One axis of the slice: the world's, from one edge of the grid to the other, and how it is shown.
 struct Axis {
@@ -25,7 +25,7 @@ struct Axis {
 };
 
 /// All that the frame is made of, for one size of the picture.
-struct Layout {
+struct FrameLayout {
   SlicePlace place;
   double size = 10;  // of the text
   double gap = 4, tick = 4;
@@ -37,7 +37,7 @@ struct Layout {
   double caption_top = 0;
 };
 
-std::array<std::size_t, 2> axes_of(int axis) {
+std::array<std::size_t, 2> shown_axes(int axis) {
   if (axis == 2) return {0, 1};
   return axis == 1 ? std::array<std::size_t, 2>{0, 2} : std::array<std::size_t, 2>{1, 2};
 }
@@ -63,13 +63,13 @@ std::string axis_label(const Axis& axis, const std::string& unit) {
   return fmt::format("{} ({}{}{})", axis.name, power, power.empty() ? "" : " ", unit);
 }
 
-std::string bar_label(const SliceFrame& f, const Layout& l) {
+std::string bar_label(const SliceFrame& f, const FrameLayout& l) {
   const std::string power = times_power(l.values.exponent);
   const std::string unit = power + (power.empty() || f.unit.empty() ? "" : " ") + f.unit;
   return unit.empty() ? f.quantity : fmt::format("{} ({})", f.quantity, unit);
 }
 
-std::string title(const SliceFrame& f, const Layout& l) {
+std::string title(const SliceFrame& f, const FrameLayout& l) {
   return fmt::format("{} = {} {}", "xyz"[f.axis], number_text(f.position * l.across.factor), l.unit);
 }
 
@@ -105,8 +105,8 @@ SlicePlace fit(double left, double top, double room_x, double room_y, const Axis
   return p;
 }
 
-Layout lay_out(const SliceFrame& f, std::int64_t width, std::int64_t height) {
-  Layout l;
+FrameLayout lay_out(const SliceFrame& f, std::int64_t width, std::int64_t height) {
+  FrameLayout l;
   const double w = static_cast<double>(width), h = static_cast<double>(height);
   l.size = text_size({width, height, {}});
   l.place = {0, 0, width, height, false};
@@ -115,7 +115,7 @@ Layout lay_out(const SliceFrame& f, std::int64_t width, std::int64_t height) {
   const double size = l.size, cap = cap_height(size), line = line_height(size);
   l.gap = std::round(0.4 * size);
   l.tick = std::round(0.3 * size);
-  const auto axes = axes_of(f.axis);
+  const auto axes = shown_axes(f.axis);
   l.across = world_axis(f.grid, axes[0]);
   l.down = world_axis(f.grid, axes[1]);
   const ShownUnit unit = shown_unit(f.grid.unit, std::max(l.across.length, l.down.length));
@@ -142,11 +142,11 @@ Layout lay_out(const SliceFrame& f, std::int64_t width, std::int64_t height) {
   return l;
 }
 
-void draw_axes_around(Image& image, const Layout& l) {
+void draw_axes_around(Image& image, const FrameLayout& l) {
   const SlicePlace& p = l.place;
   const auto tick = static_cast<std::int64_t>(l.tick);
   const double size = l.size, cap = cap_height(size);
-  frame(image, p.left - 1, p.top - 1, p.width + 2, p.height + 2, kInk);
+  frame(image, p.left - 1, p.top - 1, p.width + 2, p.height + 2, kFrameInk);
   const auto along = [](const Axis& a, const Tick& t, std::int64_t pixels) {
     return (t.value / a.factor - a.low) / a.length * static_cast<double>(pixels);
   };
@@ -155,36 +155,36 @@ void draw_axes_around(Image& image, const Layout& l) {
   for (const Tick& t : l.across.ticks.ticks) {
     const double x = static_cast<double>(p.left) + along(l.across, t, p.width),
                  wide = text_width(t.label, size);
-    fill(image, std::llround(x - 0.5), p.top + p.height + 1, 1, tick, kInk);
+    fill(image, std::llround(x - 0.5), p.top + p.height + 1, 1, tick, kFrameInk);
     if (x - wide / 2 < free_from) continue;
     draw_text(image, x - wide / 2, static_cast<double>(p.top + p.height) + 1 + l.tick + l.gap, t.label, size,
-              kInk);
+              kFrameInk);
     free_from = x + wide / 2 + 0.5 * size;
   }
   free_from = 0;
   for (const Tick& t : l.down.ticks.ticks) {
     const double y = static_cast<double>(p.top) + along(l.down, t, p.height);
-    fill(image, p.left - 1 - tick, std::llround(y - 0.5), tick, 1, kInk);
+    fill(image, p.left - 1 - tick, std::llround(y - 0.5), tick, 1, kFrameInk);
     if (y - cap / 2 < free_from) continue;
     free_from = y + cap / 2 + 0.3 * size;
     draw_text(image, static_cast<double>(p.left) - 1 - l.tick - l.gap - text_width(t.label, size),
-              y - cap / 2, t.label, size, kInk);
+              y - cap / 2, t.label, size, kFrameInk);
   }
   const std::string below = axis_label(l.across, l.unit), beside = axis_label(l.down, l.unit);
   draw_text(image, static_cast<double>(p.left),
             static_cast<double>(p.top + p.height) + 1 + l.tick + l.gap + line_height(size), below, size,
-            kInk);
+            kFrameInk);
   // Centred beside the slice, but within the picture.
   const double wide = text_width(beside, size),
                middle = static_cast<double>(p.top) + static_cast<double>(p.height) / 2;
   const double bottom = std::clamp(middle + wide / 2, wide, std::max(wide, l.caption_top));
   draw_text_upwards(image,
                     static_cast<double>(p.left) - 1 - l.tick - 2 * l.gap - widest(l.down.ticks, size) - cap,
-                    bottom, beside, size, kInk);
+                    bottom, beside, size, kFrameInk);
 }
 
 /// Below the slice, at its right end, in the line of the axis' name.
-void draw_scale_bar(Image& image, const Layout& l) {
+void draw_scale_bar(Image& image, const FrameLayout& l) {
   const SlicePlace& p = l.place;
   const double shown = l.across.length * l.across.factor, length = round_length(0.3 * shown);
   const auto pixels = std::max<std::int64_t>(1, std::llround(length / shown * static_cast<double>(p.width)));
@@ -194,13 +194,13 @@ void draw_scale_bar(Image& image, const Layout& l) {
   const double name = text_width(axis_label(l.across, l.unit), size), wide = text_width(label, size);
   const double left = static_cast<double>(p.left + p.width - pixels) - l.gap - wide;
   if (left < static_cast<double>(p.left) + name + size) return;  // a narrow slice has its axis
-  draw_text(image, left, top, label, size, kInk);
+  draw_text(image, left, top, label, size, kFrameInk);
   const auto thick = std::max<std::int64_t>(2, std::llround(size / 6));
   fill(image, p.left + p.width - pixels, std::llround(top + cap_height(size) / 2) - thick / 2, pixels, thick,
-       kInk);
+       kFrameInk);
 }
 
-void draw_bar(Image& image, const SliceFrame& f, const Layout& l, std::int64_t width) {
+void draw_bar(Image& image, const SliceFrame& f, const FrameLayout& l, std::int64_t width) {
   // As high as the slice, and never so flat that its numbers touch.
   const double size = l.size, cap = cap_height(size);
   const auto least = std::llround(2.2 * size * static_cast<double>(l.values.ticks.size()));
@@ -215,19 +215,20 @@ void draw_bar(Image& image, const SliceFrame& f, const Layout& l, std::int64_t w
       c[k] = static_cast<std::uint8_t>(std::lround(255 * std::clamp(p.rgb[k], 0.0, 1.0)));
     fill(image, l.bar_left, top + j, l.bar_width, 1, c);
   }
-  frame(image, l.bar_left - 1, top - 1, l.bar_width + 2, height + 2, kInk);
+  frame(image, l.bar_left - 1, top - 1, l.bar_width + 2, height + 2, kFrameInk);
   for (const Tick& t : l.values.ticks) {
     const double part = hi > lo ? (t.value - lo) / (hi - lo) : 0.5;
     const double y = static_cast<double>(top) + (1 - part) * static_cast<double>(height);
     const std::int64_t x = l.bar_left + l.bar_width + 1;
-    fill(image, x, std::llround(y - 0.5), static_cast<std::int64_t>(l.tick), 1, kInk);
-    draw_text(image, static_cast<double>(x) + l.tick + l.gap, y - cap / 2, t.label, size, kInk);
+    fill(image, x, std::llround(y - 0.5), static_cast<std::int64_t>(l.tick), 1, kFrameInk);
+    draw_text(image, static_cast<double>(x) + l.tick + l.gap, y - cap / 2, t.label, size, kFrameInk);
   }
   // Beside the title.
   const double room = static_cast<double>(width - l.place.left) - text_width(title(f, l), size) - 2 * size;
   const std::string label = fitted(bar_label(f, l), room, size);
   draw_text(image, static_cast<double>(width) - 0.6 * size - text_width(label, size),
-            std::max(0.4 * size, static_cast<double>(top) - line_height(size) - l.gap), label, size, kInk);
+            std::max(0.4 * size, static_cast<double>(top) - line_height(size) - l.gap), label, size,
+            kFrameInk);
 }
 
 }  // namespace
@@ -237,21 +238,21 @@ SlicePlace slice_place(const SliceFrame& frame, std::int64_t width, std::int64_t
 }
 
 Image framed_slice(const SliceFrame& f, const Image& slice, std::int64_t width, std::int64_t height) {
-  const Layout l = lay_out(f, width, height);
+  const FrameLayout l = lay_out(f, width, height);
   if (slice.width != l.place.width || slice.height != l.place.height)
     throw InputError(fmt::format("a slice of {}x{} pixels in a picture of {}x{}, which has room for {}x{}",
                                  slice.width, slice.height, width, height, l.place.width, l.place.height));
   if (!l.place.framed) return slice;
-  Image image = blank(width, height, kPaper);
+  Image image = blank(width, height, kFrame);
   draw_axes_around(image, l);
   draw_scale_bar(image, l);
   draw_bar(image, f, l, width);
   draw_text(image, static_cast<double>(l.place.left),
             std::max(0.4 * l.size, static_cast<double>(l.place.top) - line_height(l.size) - l.gap),
-            title(f, l), l.size, kInk);
+            title(f, l), l.size, kFrameInk);
   for (std::size_t i = 0; i < l.caption.size(); ++i)
     draw_text(image, l.size, l.caption_top + static_cast<double>(i) * line_height(0.85 * l.size),
-              l.caption[i], 0.85 * l.size, kInk);
+              l.caption[i], 0.85 * l.size, kFrameInk);
   paste(image, l.place.left, l.place.top, slice);
   return image;
 }

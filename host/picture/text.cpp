@@ -90,17 +90,17 @@ Line set(std::string_view text, double size) {
 }
 
 /// How much of each pixel the letters cover, 0 to 255, of a text whose origin lies at (left, base) of it.
-struct Coverage {
+struct Ink {
   std::int64_t width = 0, height = 0;
   std::int64_t left = 0, base = 0;
   std::vector<std::uint8_t> part;
 };
 
 /// `fraction_x`, `fraction_y`: where in a pixel the origin lies.
-Coverage cover(const Line& line, double size, double fraction_x, double fraction_y) {
+Ink cover(const Line& line, double size, double fraction_x, double fraction_y) {
   const stbtt_fontinfo& f = font();
   const float scale = scale_of(size);
-  Coverage c;
+  Ink c;
   // Letters that reach beyond their em, on either side of the line.
   const auto room = static_cast<std::int64_t>(std::ceil(size)) + 2;
   c.left = room;
@@ -183,7 +183,7 @@ double line_height(double size) { return 1.3 * size; }
 void draw_text(Image& image, double x, double top, std::string_view text, double size, const Colour& colour) {
   // The base line lies on a whole pixel: horizontal strokes are sharp.
   const double base = std::round(top + cap_height(size)), left = std::floor(x);
-  const Coverage c = cover(set(text, size), size, x - left, 0);
+  const Ink c = cover(set(text, size), size, x - left, 0);
   for (std::int64_t j = 0; j < c.height; ++j)
     for (std::int64_t i = 0; i < c.width; ++i)
       mix(image, static_cast<std::int64_t>(left) + i - c.left, static_cast<std::int64_t>(base) + j - c.base,
@@ -193,7 +193,7 @@ void draw_text(Image& image, double x, double top, std::string_view text, double
 void draw_text_upwards(Image& image, double left, double bottom, std::string_view text, double size,
                        const Colour& colour) {
   const double base = std::round(left + cap_height(size)), foot = std::ceil(bottom);
-  const Coverage c = cover(set(text, size), size, foot - bottom, 0);
+  const Ink c = cover(set(text, size), size, foot - bottom, 0);
   for (std::int64_t j = 0; j < c.height; ++j)
     for (std::int64_t i = 0; i < c.width; ++i)
       mix(image, static_cast<std::int64_t>(base) + j - c.base,

@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::int64_t fewest_flats = 5;
 
-double median_of(std::vector<double> values) {
+double upper_median(std::vector<double> values) {
   if (values.empty()) return 0;
   const auto middle = values.begin() + std::ssize(values) / 2;
   std::nth_element(values.begin(), middle, values.end());
@@ -63,7 +63,7 @@ std::optional<LineIntegralNoise> photon_transfer(const io::Frames& flats, const 
   Moments dark{std::vector<double>(size), {}};
   if (darks.count > 0) dark = moments_of(darks, size, {}, false);
   const double read =
-      darks.count > 1 ? median_of(dark.variance) / median_of_variance(static_cast<double>(darks.count - 1))
+      darks.count > 1 ? upper_median(dark.variance) / median_of_variance(static_cast<double>(darks.count - 1))
                       : 0;
   const Moments flat = moments_of(flats, size, dark.mean, true);
   const auto is_usable = [&](std::size_t i) {
@@ -77,7 +77,7 @@ std::optional<LineIntegralNoise> photon_transfer(const io::Frames& flats, const 
       levels.push_back(flat.mean[i]);
     }
   if (gains.empty()) return std::nullopt;
-  const double gain = median_of(std::move(gains)), level = median_of(std::move(levels));
+  const double gain = upper_median(std::move(gains)), level = upper_median(std::move(levels));
   if (!(gain > 0) || !std::isfinite(gain)) return std::nullopt;
   LineIntegralNoise out;
   out.source = "flats";

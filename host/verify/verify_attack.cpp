@@ -18,7 +18,7 @@ namespace {
 constexpr std::size_t points_per_cell = 19;     // of 27: not the corners, which are nodes
 constexpr std::size_t most_cells = 210;         // 3,990 points
 constexpr std::size_t most_cells_of_brick = 4;  // a brick's cells have much in common
-constexpr double most_work = 2e10;
+constexpr double attack_work = 2e10;
 
 // Middle of a cell, of its faces and of its edges, in halves of a cell.
 template <class Visit>
@@ -73,7 +73,7 @@ TotalAttack::Outcome TotalAttack::run(const ExactField& exact, const Progress& p
   const ParallelGeometry& g = exact.geometry();
   // A height costs all coefficients, of cone beam a point does.
   const auto most_heights = static_cast<std::size_t>(
-      std::max(48.0, most_work / static_cast<double>(g.views() * g.rows * g.columns)));
+      std::max(48.0, attack_work / static_cast<double>(g.views() * g.rows * g.columns)));
   const std::size_t most_points = exact.views().empty() ? SIZE_MAX : most_heights;
   std::set<double> heights;
   std::vector<Vec3> points;

@@ -17,8 +17,6 @@ static_assert(static_cast<int>(SampleType::f32) == VDVR_F32 &&
 
 namespace {
 
-constexpr LevelTriple in_base{0, 0, 0};
-
 std::uint64_t aligned(std::uint64_t bytes) { return (bytes + 3) / 4 * 4; }
 
 }  // namespace
@@ -89,7 +87,7 @@ struct RecordBits {
 };
 RecordBits record_bits(const MixedVolume& v, std::size_t brick) {
   const LevelTriple level = v.level[brick];
-  const StoredTile stored = level == in_base ? StoredTile{{}, &v.base, 0} : stored_tile(v, brick);
+  const StoredTile stored = level == level_of_base ? StoredTile{{}, &v.base, 0} : stored_tile(v, brick);
   const SampleBlock& block = *stored.block;
   RecordBits r;
   r.bits = level[2] | static_cast<std::uint32_t>(level[1]) << 3 | static_cast<std::uint32_t>(level[0]) << 6 |
@@ -105,7 +103,7 @@ std::uint64_t place_of(const MixedVolume& v, const std::map<TileKind, std::uint6
   const Index3 bricks = v.bricks(), samples = v.base_samples();
   const std::size_t brick = at((bz * bricks[1] + by) * bricks[0] + bx);
   const LevelTriple level = v.level[brick];
-  if (level == in_base) {
+  if (level == level_of_base) {
     const Index3 first = first_base_sample(v, {bx, by, bz});
     return static_cast<std::uint64_t>((first[2] * samples[1] + first[1]) * samples[0] + first[0]);
   }
@@ -173,7 +171,7 @@ BrickSamples::BrickSamples(const MixedVolume& v, const Index3& brick)
   const Index3 b = v.bricks();
   const std::size_t id = vdvr::at((brick[2] * b[1] + brick[1]) * b[0] + brick[0]);
   const LevelTriple level = v.level[id];
-  const StoredTile stored = level == in_base ? StoredTile{{}, &v.base, 0} : stored_tile(v, id);
+  const StoredTile stored = level == level_of_base ? StoredTile{{}, &v.base, 0} : stored_tile(v, id);
   record_ = brick_record(v, {{stored.kind, 0}}, brick[0], brick[1], brick[2]);
   data_ = stored.block->data();
   for (std::size_t a = 0; a < 3; ++a)

@@ -14,8 +14,6 @@ namespace vdvr {
 
 namespace {
 
-constexpr LevelTriple in_base{0, 0, 0};
-
 template <class T>
 void decode(const Samples<T>& stored, const SampleBlock& b, double step, std::vector<float>& out) {
   const std::size_t per_tile = b.offset.empty() ? 1 : stored.size() / b.offset.size();
@@ -127,7 +125,7 @@ Storage storage_of(const MixedVolume& v, bool interior) {
         if (interior && !is_interior(v, {x, y, z})) continue;
         const LevelTriple level = v.level[at((z * b[1] + y) * b[0] + x)];
         index += 1;
-        if (level != in_base) {
+        if (level != level_of_base) {
           tiles += static_cast<double>(v.tile_size(level));
           tile_bytes +=
               static_cast<double>(v.tile_size(level)) *

@@ -22,7 +22,6 @@ constexpr int largest_rate = 64;
 // Cell coordinates are fp32 in the sampler: beyond 2^24 neighbouring cells are no longer told apart.
 constexpr std::int64_t most_cells = std::int64_t{1} << 24;
 constexpr std::size_t longest_unit = 255;
-constexpr LevelTriple in_base{0, 0, 0};
 
 }  // namespace
 
@@ -102,7 +101,7 @@ std::optional<Problem> index_problem(const MixedVolume& v, const std::map<TileKi
       return Problem{"/level",
                      fmt::format("{} has level {}, {}, {}; rate {} ends at {}", brick_text(v, i), l[0], l[1],
                                  l[2], v.rate, fmt::join(finest_level(v.rate, v.coarsening), ", "))};
-    if (l == in_base) {
+    if (l == level_of_base) {
       if (t != 0)
         return Problem{"/tile",
                        fmt::format("{} reads the base but has tile {}, expected 0", brick_text(v, i), t)};
@@ -234,7 +233,7 @@ std::optional<Problem> validate_volume(const MixedVolume& v) {
   if (has_integers(v))
     if (auto p = step_problem(v)) return p;
   for (const auto& [triple, samples] : v.tiles) {
-    if (triple.level == in_base)
+    if (triple.level == level_of_base)
       return Problem{path_of(triple), "level 0,0,0 reads the base and has no tiles"};
     if (*std::max_element(triple.level.begin(), triple.level.end()) > largest_level)
       return Problem{path_of(triple), fmt::format("a level above {}", largest_level)};

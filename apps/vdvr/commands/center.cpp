@@ -46,14 +46,14 @@ double step_of(const std::optional<CenterEstimate>& found, std::int64_t columns,
   return std::max(half, std::min(2 * reach, static_cast<double>(columns) / 8) / steps);
 }
 
-struct Wanted {
+struct Search {
   FieldOptions field;
   std::int64_t row = -1, count = 15;
   std::optional<double> step;
 };
 
 CenterSheetOptions sheet_of(const ProjectionSet& scan, const std::optional<CenterEstimate>& found,
-                            const Wanted& wanted) {
+                            const Search& wanted) {
   const int binning = wanted.field.preparation.binning;
   const double middle = wanted.field.center ? *wanted.field.center
                         : found             ? found->center
@@ -106,7 +106,7 @@ int center_command(Arguments& args) {
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
   const auto path = args.path("IN");
-  Wanted wanted;
+  Search wanted;
   wanted.field = field_options(args);
   // The axis is looked for in the views as they are.
   wanted.field.preparation.half_acquisition = false;

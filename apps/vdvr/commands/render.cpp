@@ -255,7 +255,7 @@ RenderResult draw_one(const Stage& stage, const RenderOptions& o, const std::fil
 }
 
 /// What the command makes of its words.
-struct Asked {
+struct Request {
   RenderOptions options;
   Overlay overlay;
   std::filesystem::path output;
@@ -266,8 +266,8 @@ struct Asked {
 };
 
 /// Throws InputError for whatever can be refused before anything is read.
-Asked asked_of(const Arguments& args, const CommonOptions& common) {
-  Asked a;
+Request request_of(const Arguments& args, const CommonOptions& common) {
+  Request a;
   a.options = render_options(args);
   check_combination(args, a.options);
   a.overlay = overlay_options(args, a.options.mode);
@@ -336,7 +336,7 @@ OrbitFrame look_at_volume(const Arguments& args, Source& source, Drawn& drawn, c
 }
 
 /// A turn or one picture, into the output.
-void draw_asked(const Arguments& args, const CommonOptions& common, const Asked& asked, const Stage& stage,
+void draw_asked(const Arguments& args, const CommonOptions& common, const Request& asked, const Stage& stage,
                 Drawn& drawn, const Progress& progress) {
   RenderOptions& o = drawn.options;
   // All frames have the window of the first.
@@ -367,7 +367,7 @@ std::string stamp_of(const Drawn& drawn, Source& source) {
                                 : "no certificate";
 }
 
-Json drawn_json(const Asked& asked, const Drawn& drawn, Source& source) {
+Json drawn_json(const Request& asked, const Drawn& drawn, Source& source) {
   const RenderOptions& o = drawn.options;
   const RenderResult& result = drawn.result;
   const bool lit = (o.mode == RenderMode::dvr || o.mode == RenderMode::iso) &&
@@ -399,7 +399,7 @@ Json drawn_json(const Asked& asked, const Drawn& drawn, Source& source) {
           {"device_trusted", source.trusted()}};
 }
 
-void print_drawn(const Asked& asked, const Drawn& drawn, Source& source) {
+void print_drawn(const Request& asked, const Drawn& drawn, Source& source) {
   const RenderOptions& o = drawn.options;
   const RenderResult& result = drawn.result;
   const double mebibytes = static_cast<double>(source.bytes()) / (1 << 20);
@@ -443,7 +443,7 @@ int render_command(Arguments& args) {
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
   untrusted_option(args);
-  const Asked asked = asked_of(args, common);
+  const Request asked = request_of(args, common);
   if (asked.options.mode == RenderMode::error)
     return render_error(args, common, asked.options, asked.output, asked.kind);
 

@@ -131,8 +131,8 @@ TrustInputs trust_inputs() {
     in.records.push_back(lx | ly << 3 | lz << 6 | type << 10 | shift << 12 |
                          (type == VDVR_F32 ? 0 : offset << 17));
     for (std::size_t at = brick * brick_bytes; at < (brick + 1) * brick_bytes; at += 4) {
-      const std::uint32_t word =
-          type == VDVR_F32 ? std::bit_cast<std::uint32_t>(sign() * mantissa()) : random();
+      const std::uint32_t word = type == VDVR_F32 ? std::bit_cast<std::uint32_t>(sign() * mantissa())
+                                                  : static_cast<std::uint32_t>(random());
       std::memcpy(in.samples.data() + at, &word, 4);
     }
   }

@@ -17,7 +17,7 @@ AmplitudeBounds amplitude_bounds(const FilteredScan& scan, const Grid& grid, con
   const ParallelGeometry& g = scan.geometry;
   const std::int64_t U = g.columns, V = g.rows;
   const auto du = analysis_matrix(U), dv = analysis_matrix(V);
-  constexpr double pi = std::numbers::pi;
+  using std::numbers::pi;
   // [view][rate], summed in the order of views: a build made twice says the same to the bit.
   std::vector<std::vector<double>> projection(at(g.views())), gold(at(g.views()));
   parallel_for((g.views() + step - 1) / step, {}, "amplitude", [&](std::int64_t i) {

@@ -19,7 +19,7 @@ static_assert(sizeof(VdvrFrequencies) == 44);
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 constexpr int kTableSteps = 256;
 // (1 - exp(-D))^2 / D is at most 0.40727, at D = 1.2564; twice that bounds phi_j^2 / (L_j (Lambda_j - L_j)).
 constexpr double kPhaseFactor = 0.8146;

@@ -15,10 +15,10 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr std::size_t smoothness = 6;   // derivatives of e that the Fourier series' tail asks for
-constexpr std::size_t highest = 12;     // derivatives of e that are looked at between frequencies
-constexpr std::int64_t samples = 1024;  // of a period of the Fourier series
-using Derivatives = std::array<double, highest + 1>;
+constexpr std::size_t smoothness = 6;          // derivatives of e that the Fourier series' tail asks for
+constexpr std::size_t highest = 12;            // derivatives of e that are looked at between frequencies
+constexpr std::int64_t series_samples = 1024;  // of a period of the Fourier series
+using UpToHighest = std::array<double, highest + 1>;
 
 double factorial_ratio(int n, int m) {  // n! / (n - m)!, 0 for m > n
   double product = 1;
@@ -71,7 +71,7 @@ void symbol(const NodeFunctional& f, double kappa, std::size_t count, Complex* d
 // At least |e^(n + m)| on [from, to] for every moment n < moments and m <= highest: a function lies at most
 // step^2 / 8 times its second derivative above the largest of its values `step` apart. The highest two are
 // bounded by `magnitude`.
-std::vector<Derivatives> largest_derivatives(const NodeFunctional& f, double from, double to, int steps,
+std::vector<UpToHighest> largest_derivatives(const NodeFunctional& f, double from, double to, int steps,
                                              std::size_t moments) {
   const std::size_t known = highest - 1;  // of each moment
   std::vector<Complex> at(moments + known - 1);
@@ -82,7 +82,7 @@ std::vector<Derivatives> largest_derivatives(const NodeFunctional& f, double fro
   }
   for (std::size_t m = 0; m < moments + highest; ++m) all.push_back(magnitude(f, m, to));
   const double step = (to - from) / steps;
-  std::vector<Derivatives> out(moments);
+  std::vector<UpToHighest> out(moments);
   for (std::size_t n = 0; n < moments; ++n)
     for (std::size_t m = highest + 1; m-- > 0;)
       out[n][m] = m >= known
@@ -126,7 +126,7 @@ std::array<double, smoothness + 1> cut_derivatives() {
 
 // A bound of sum over |j| >= samples / 2 of |a_j|, a_j the Fourier coefficients of e cut(kappa) of period 2
 // `end`: |a_j| <= (end / (pi |j|))^6 mean |(e cut)^(6)|.
-double tail(const Derivatives& inside, const Derivatives& falling, double band, double end) {
+double tail(const UpToHighest& inside, const UpToHighest& falling, double band, double end) {
   static const auto of_cut = cut_derivatives();
   constexpr std::array binomial{1.0, 6.0, 15.0, 20.0, 15.0, 6.0, 1.0};
   double sixth = 0;
@@ -134,17 +134,17 @@ double tail(const Derivatives& inside, const Derivatives& falling, double band, 
     sixth += binomial[m] * falling[m] * of_cut[smoothness - m] /
              std::pow(end - band, static_cast<double>(smoothness - m));
   const double mean = (band * inside[smoothness] + (end - band) * sixth) / end;
-  return 2 * std::pow(end / std::numbers::pi, 6) * mean / (5 * std::pow(samples / 2.0 - 1, 5));
+  return 2 * std::pow(end / std::numbers::pi, 6) * mean / (5 * std::pow(series_samples / 2.0 - 1, 5));
 }
 
 // sum |a_j| of every moment: of the coefficients by FFT, what is beyond them, and what is beyond them folded
 // onto them.
-std::vector<double> coefficient_sums(const NodeFunctional& f, const std::vector<Derivatives>& inside,
+std::vector<double> coefficient_sums(const NodeFunctional& f, const std::vector<UpToHighest>& inside,
                                      double band, double end) {
-  static const fft::HostFft transform(samples);
-  constexpr std::size_t half = samples / 2;
+  static const fft::HostFft transform(series_samples);
+  constexpr std::size_t half = series_samples / 2;
   const std::size_t moments = inside.size();
-  std::vector<std::vector<Complex>> g(moments, std::vector<Complex>(samples));
+  std::vector<std::vector<Complex>> g(moments, std::vector<Complex>(series_samples));
   std::vector<Complex> at(moments);
   for (std::size_t s = 0; s <= half; ++s) {
     const double kappa = end * static_cast<double>(s) / static_cast<double>(half);
@@ -153,18 +153,18 @@ std::vector<double> coefficient_sums(const NodeFunctional& f, const std::vector<
     symbol(f, kappa, moments, at.data());
     for (std::size_t n = 0; n < moments; ++n) {
       g[n][s] = at[n] * factor;
-      if (s > 0) g[n][samples - s] = std::conj(g[n][s]);
+      if (s > 0) g[n][series_samples - s] = std::conj(g[n][s]);
     }
   }
-  const std::vector<Derivatives> falling = largest_derivatives(f, band, end, 64, moments);
+  const std::vector<UpToHighest> falling = largest_derivatives(f, band, end, 64, moments);
   std::vector<double> out(moments);
   for (std::size_t n = 0; n < moments; ++n) {
     transform.forward(g[n]);
     double sum = 0;
-    for (const Complex& a : g[n]) sum += std::sqrt(std::norm(a)) / samples;
+    for (const Complex& a : g[n]) sum += std::sqrt(std::norm(a)) / series_samples;
     // Errors of the samples and of the FFT, in the 2-norm: sum |a_j| <= sqrt(samples) times the norm of all
     // a_j.
-    const double noise = std::sqrt(double{samples}) * 8 * rounding(f, magnitude(f, n, end));
+    const double noise = std::sqrt(double{series_samples}) * 8 * rounding(f, magnitude(f, n, end));
     out[n] = sum + 2 * tail(inside[n], falling[n], band, end) + noise;
   }
   return out;
@@ -184,7 +184,7 @@ double largest_symbol_error(const NodeFunctional& functional, double band) {
 
 // A narrow fall is the better where e grows beyond the band, a wide one where it does not.
 std::vector<double> moment_sup_constants(const NodeFunctional& functional, double band, std::size_t count) {
-  const std::vector<Derivatives> inside = largest_derivatives(functional, 0, band, 128, count);
+  const std::vector<UpToHighest> inside = largest_derivatives(functional, 0, band, 128, count);
   std::vector<double> least(count, HUGE_VAL);
   for (const double ratio : {1.015, 1.2}) {
     const std::vector<double> found = coefficient_sums(functional, inside, band, band * ratio);

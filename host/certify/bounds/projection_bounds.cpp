@@ -27,7 +27,7 @@
 namespace vdvr {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 constexpr double smallest_normal = 0x1p-126;
 
 }  // namespace
@@ -396,7 +396,7 @@ double filter_error_bound(Upsampler& upsampler, const FilteredScan& scan) {
 namespace {
 
 // What interpolation between columns multiplies and adds.
-struct Weights {
+struct ColumnWeights {
   double taps = 2;       // of a sample
   double gain = 1;       // largest sum of magnitudes
   double slope = 1;      // of the interpolant's slope, of the largest difference quotient of columns
@@ -404,7 +404,7 @@ struct Weights {
   double rounding = 0;   // of the weights, beyond eight roundings of their sum
 };
 
-Weights weights_of(Interpolation interpolation) {
+ColumnWeights weights_of(Interpolation interpolation) {
   switch (interpolation) {
     case Interpolation::linear:
       return {2, 1, 1, 0, 0};
@@ -435,7 +435,7 @@ ChainErrors chain_errors(Upsampler& upsampler, const FilteredScan& scan, const F
   const double gain_u = upsampler.gain_u();
   double samples = 0;
   for (const double m : scan.view_max) samples += m;
-  const Weights w = weights_of(interpolation);
+  const ColumnWeights w = weights_of(interpolation);
   const double run = static_cast<double>(view_run(interpolation)), views = static_cast<double>(g.views());
   // An upsampled column is at most the samples times the gain, and the sup of the signal.
   const double largest = std::min(gain_u * samples, sups.value);
@@ -462,7 +462,7 @@ double arithmetic_bound(Upsampler& upsampler, const FilteredScan& scan, const Fi
   const double gain_u = upsampler.gain_u(), gain_v = lebesgue_constant(g.rows);
   double samples = 0;
   for (const double m : scan.view_max) samples += m;
-  const Weights w = weights_of(interpolation);
+  const ColumnWeights w = weights_of(interpolation);
   const double weight_gain = w.gain;
   // Rows first, then columns: each product errs relative to its own operands (+2: the matrix entries and the
   // result round).

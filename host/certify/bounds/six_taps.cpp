@@ -13,12 +13,12 @@ namespace {
 
 constexpr std::size_t taps = 6;
 constexpr int steps = 32;  // of f in [0, 1 / 2]: the weights at 1 - f are those at f, mirrored
-constexpr double step = 0.5 / steps;
-constexpr double bend = step * step / 8;  // times a second derivative: what a function rises between steps
+constexpr double apart = 0.5 / steps;
+constexpr double bend = apart * apart / 8;  // times a second derivative: what a function rises between steps
 constexpr std::array<std::array<double, 3>, 3> even{
     {{VDVR_SIX_EVEN_A}, {VDVR_SIX_EVEN_B}, {VDVR_SIX_EVEN_C}}};
 constexpr std::array<std::array<double, 3>, 3> odd{{{VDVR_SIX_ODD_A}, {VDVR_SIX_ODD_B}, {VDVR_SIX_ODD_C}}};
-using Weights = std::array<double, taps>;
+using TapWeights = std::array<double, taps>;
 
 // Coefficient of g^i in the weight of a tap, taps counted from 0.
 double coefficient(std::size_t tap, std::size_t i) {
@@ -35,8 +35,8 @@ double fallen(std::size_t i, std::size_t order) {
 }
 
 // The order-th derivatives of the weights at f.
-Weights derivatives(double f, std::size_t order) {
-  Weights w{};
+TapWeights derivatives(double f, std::size_t order) {
+  TapWeights w{};
   for (std::size_t tap = 0; tap < taps; ++tap)
     for (std::size_t i = order; i < taps; ++i)
       w[tap] += coefficient(tap, i) * fallen(i, order) * std::pow(f - 0.5, static_cast<double>(i - order));
@@ -56,7 +56,7 @@ double largest_derivative(std::size_t first, std::size_t last, std::size_t order
 
 // What the order-th derivative of the interpolant by f errs against that of the field: at f.
 NodeFunctional functional(double f, std::size_t order) {
-  const Weights w = derivatives(f, order);
+  const TapWeights w = derivatives(f, order);
   return {{w.begin(), w.end()}, -2 - f, static_cast<int>(order)};
 }
 
@@ -68,7 +68,7 @@ double over_all_places(double w, const Of& of) {
   double largest = std::pow(w, 6);
   for (const std::size_t order : {4U, 2U, 0U}) {
     double at_steps = 0;
-    for (int s = 0; s <= steps; ++s) at_steps = std::max(at_steps, of(functional(step * s, order)));
+    for (int s = 0; s <= steps; ++s) at_steps = std::max(at_steps, of(functional(apart * s, order)));
     largest = at_steps + bend * largest;
   }
   return largest;
@@ -84,8 +84,8 @@ void bound_sums(SixTaps& six) {
   }
   for (int s = 0; s <= 2 * steps; ++s) {
     double norm = bend_of_weights, slope = 0, part = 0;
-    for (const double w : derivatives(step * s, 0)) norm += std::abs(w);
-    const Weights slopes = derivatives(step * s, 1);
+    for (const double w : derivatives(apart * s, 0)) norm += std::abs(w);
+    const TapWeights slopes = derivatives(apart * s, 1);
     for (std::size_t tap = 0; tap + 1 < taps; ++tap) {
       part += slopes[tap];
       slope += std::abs(part) + bend_of_part[tap];

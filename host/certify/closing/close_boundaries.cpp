@@ -16,7 +16,6 @@
 namespace vdvr {
 namespace {
 
-constexpr LevelTriple in_base{0, 0, 0};
 // Bricks that a thread takes at once: a tile takes microseconds.
 constexpr std::int64_t batch = 64;
 
@@ -108,7 +107,7 @@ MixedVolume CloseBoundaries::volume(const MixedVolume* before) {
     if (made_[at(i)]) pack(tile_of(i), open_.lattice, shift_[at(i)], to.number, block);
     else copy_tile(stored_tile(*before, at(i)), at(v.tile_size(v.level[at(i)])), block, to.number);
   });
-  for (std::size_t i = 0; i < made_.size(); ++i) made_[i] = made_[i] && v.level[i] != in_base;
+  for (std::size_t i = 0; i < made_.size(); ++i) made_[i] = made_[i] && v.level[i] != level_of_base;
   v.base = pack_base(closing_ == Closing::none ? open_.base : shared_base(), open_.lattice);
   return v;
 }
@@ -119,7 +118,7 @@ void CloseBoundaries::number_tiles(MixedVolume& v) const {
   std::uint64_t bytes = 0;
   constexpr std::array<std::uint64_t, 3> bytes_of{sizeof(float), sizeof(std::uint16_t), sizeof(std::uint8_t)};
   for (std::size_t i = 0; i < v.level.size(); ++i)
-    if (v.level[i] != in_base) {
+    if (v.level[i] != level_of_base) {
       ++counts[v.level[i]][2 - static_cast<std::size_t>(type_[i])];
       bytes +=
           bytes_of[static_cast<std::size_t>(type_[i])] * static_cast<std::uint64_t>(v.tile_size(v.level[i]));
@@ -138,7 +137,7 @@ void CloseBoundaries::number_tiles(MixedVolume& v) const {
     }
   }
   for (std::size_t i = 0; i < v.level.size(); ++i)
-    if (v.level[i] != in_base) v.tile[i] = counts[v.level[i]][2 - static_cast<std::size_t>(type_[i])]++;
+    if (v.level[i] != level_of_base) v.tile[i] = counts[v.level[i]][2 - static_cast<std::size_t>(type_[i])]++;
 }
 
 std::vector<float> CloseBoundaries::tile_of(std::int64_t brick) const {
@@ -149,7 +148,7 @@ std::vector<float> CloseBoundaries::tile_of(std::int64_t brick) const {
 
 void CloseBoundaries::for_each_tile(const std::function<void(std::int64_t)>& visit) const {
   for_each_brick(stored_.level.size(), [&](std::int64_t i) {
-    if (stored_.level[at(i)] != in_base) visit(i);
+    if (stored_.level[at(i)] != level_of_base) visit(i);
   });
 }
 
@@ -158,7 +157,7 @@ void CloseBoundaries::update_units() {
   stored_.unit.assign(stored_.level.size(), 0);
   if (l.step == 0) return;
   for (std::size_t i = 0; i < stored_.unit.size(); ++i) {
-    const bool base = stored_.level[i] == in_base;
+    const bool base = stored_.level[i] == level_of_base;
     if (base) stored_.unit[i] = l.base_step();
     else if (type_[i] != SampleType::f32) stored_.unit[i] = std::ldexp(l.step, shift_[i]);
   }
@@ -234,7 +233,7 @@ void CloseBoundaries::widen_types() {
 std::vector<float> CloseBoundaries::shared_base() const {
   std::vector<float> base = open_.base;
   for (std::size_t i = 0; i < rim_.size(); ++i)
-    if (rim_[i] && stored_.level[i] != in_base) share(static_cast<std::int64_t>(i), base);
+    if (rim_[i] && stored_.level[i] != level_of_base) share(static_cast<std::int64_t>(i), base);
   return base;
 }
 
@@ -251,7 +250,7 @@ void CloseBoundaries::share(std::int64_t brick, std::vector<float>& base) const 
     bool outsiders = false, base_read = false;
     for (const std::int64_t i : incident_bricks(open_, of, side, true)) {
       if (!open_.involved[at(i)]) outsiders = true;
-      else if (stored_.level[at(i)] == in_base) base_read = true;
+      else if (stored_.level[at(i)] == level_of_base) base_read = true;
     }
     if (!outsiders || base_read) return;
     Entity(stored_, of, side).for_each(view, step, [&](const Index3& i) {

@@ -88,10 +88,9 @@ class Raise {
     const auto incident = incident_bricks(bricks_, brick_, side);
     const std::int64_t owner = shared_part(bricks_, bricks_.level, incident, side).owner;
     if (owner == brick_ || bricks_.tolerance[at(owner)] <= bricks_.tolerance[at(brick_)]) return false;
-    const LevelTriple in_base{0, 0, 0};
-    if (bricks_.level[at(owner)] != in_base) return rise_along_worst(owner);
+    if (bricks_.level[at(owner)] != level_of_base) return rise_along_worst(owner);
     for (const std::int64_t j : incident)
-      if (j != brick_ && bricks_.level[at(j)] == in_base) rise_along_worst(j);
+      if (j != brick_ && bricks_.level[at(j)] == level_of_base) rise_along_worst(j);
     return true;
   }
 

@@ -22,12 +22,12 @@ static_assert(sizeof(VdvrFourthDifferences) == 44);
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 // Bricks of a block's side. Of cone beam half as many across: nodes of all that a block reads are kept, and
 // they cost more.
 constexpr std::int64_t block_bricks = 8, cone_block_bricks = 4;
 // Nodes that a fourth difference reads on either side.
-constexpr std::int64_t reach = 2;
+constexpr std::int64_t difference_reach = 2;
 // fp32: up to nine terms with weights that add to 16, in units of u times the largest value.
 constexpr double difference_rounding = 64;
 
@@ -71,8 +71,8 @@ BrickRemainder::BrickRemainder(opencl::State& state, KeptGold& kept, const Filte
   if (scan.views.empty()) return;
   sixth_.resize(at(bricks_[0] * bricks_[1] * bricks_[2]));
   has_sixth_.resize(sixth_.size());
-  const double read = static_cast<double>(reach) * std::hypot(spacing[0], spacing[1]) - lowest_,
-               read_z = static_cast<double>(reach) * spacing[2] - lowest_z_;
+  const double read = static_cast<double>(difference_reach) * std::hypot(spacing[0], spacing[1]) - lowest_,
+               read_z = static_cast<double>(difference_reach) * spacing[2] - lowest_z_;
   if (read > kept.claimed()[0] || read_z > kept.claimed()[2])
     throw std::logic_error("BrickRemainder: reads gold beyond its bounds");
   read_.emplace(coverage_, read);
@@ -119,7 +119,7 @@ BrickRemainder::Maxima BrickRemainder::addends_of(const Index3& first, const Ind
   Vec3 low{}, high{}, square{};
   for (std::size_t a = 0; a < 3; ++a) {
     const double node = grid_.spacing[a] / static_cast<double>(rates_[a]),
-                 around = static_cast<double>(stencil_[a] + reach) * node,
+                 around = static_cast<double>(stencil_[a] + difference_reach) * node,
                  side = static_cast<double>(granularity_) * grid_.spacing[a];
     low[a] = grid_.origin[a] + static_cast<double>(first[a]) * side - around;
     high[a] = grid_.origin[a] + static_cast<double>(first[a] + bricks[a]) * side + around;
@@ -266,8 +266,8 @@ GoldBox BrickRemainder::box_of(const Index3& first, const Index3& bricks) const 
   GoldBox box;
   for (std::size_t a = 0; a < 3; ++a) {
     const std::int64_t side = granularity_ * rates_[a];
-    box.first[a] = first[a] * side - reach;
-    box.nodes[a] = bricks[a] * side + 1 + 2 * reach;
+    box.first[a] = first[a] * side - difference_reach;
+    box.nodes[a] = bricks[a] * side + 1 + 2 * difference_reach;
   }
   return box;
 }
@@ -275,12 +275,12 @@ GoldBox BrickRemainder::box_of(const Index3& first, const Index3& bricks) const 
 // Of the box' heights, two before the bricks not counted, the first and last that a tested cell's stencil
 // reads: of cone beam others are not kept.
 std::pair<int, int> BrickRemainder::heights_read(const GoldBox& box) const {
-  const std::int64_t last = box.nodes[2] - 1 - 2 * reach;
+  const std::int64_t last = box.nodes[2] - 1 - 2 * difference_reach;
   if (scan_.views.empty()) return {0, to_int(last)};
   std::pair<int, int> read{to_int(last + 1), -1};
   for (std::int64_t k = 0; k <= last; ++k) {
-    const double z = grid_.origin[2] + static_cast<double>(box.first[2] + reach + k) * grid_.spacing[2] /
-                                           static_cast<double>(rates_[2]);
+    const double z = grid_.origin[2] + static_cast<double>(box.first[2] + difference_reach + k) *
+                                           grid_.spacing[2] / static_cast<double>(rates_[2]);
     if (coverage_.margin_z(z) < lowest_z_) continue;
     read.first = std::min(read.first, to_int(k));
     read.second = to_int(k);

@@ -24,7 +24,7 @@ static_assert(sizeof(VdvrConeNodes) == 64);
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 // Values of a table to a pixel, both ways: what six taps are made for.
 constexpr int density = 8;
 // Rows from which on tables are made by transforms along v.

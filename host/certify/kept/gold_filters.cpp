@@ -9,7 +9,6 @@
 #include <numbers>
 #include <span>
 
-#include "host/certify/bounds/node_functional.hpp"
 #include "host/certify/bounds/tap_design.hpp"
 #include "vdvr/error.hpp"
 
@@ -45,12 +44,6 @@ void design_phase(GoldFilter& filter, int phase) {
   }
 }
 
-NodeFunctional functional(const GoldFilter& filter, int phase) {
-  const auto taps = static_cast<std::size_t>(filter.taps);
-  const auto h = std::span(filter.weights).subspan(static_cast<std::size_t>(phase) * taps, taps);
-  return {{h.begin(), h.end()}, filter.first() - static_cast<double>(phase) / filter.rate, 0};
-}
-
 // Largest sum of magnitudes, over positions of the finer lattice, of the difference of its interpolants.
 double difference_norm(const GoldFilter& filter, std::span<const double> difference) {
   const int reach = static_cast<int>(difference.size()) / 2, wide = filter.taps + 2 * reach;
@@ -73,6 +66,12 @@ double difference_norm(const GoldFilter& filter, std::span<const double> differe
 }
 
 }  // namespace
+
+NodeFunctional functional(const GoldFilter& filter, int phase) {
+  const auto taps = static_cast<std::size_t>(filter.taps);
+  const auto h = std::span(filter.weights).subspan(static_cast<std::size_t>(phase) * taps, taps);
+  return {{h.begin(), h.end()}, filter.first() - static_cast<double>(phase) / filter.rate, 0};
+}
 
 GoldFilter design_gold_filter(int rate, double band, int taps) {
   check(rate, band, taps);

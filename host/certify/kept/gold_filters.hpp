@@ -5,6 +5,8 @@
 #include <numbers>
 #include <vector>
 
+#include "host/certify/bounds/node_functional.hpp"
+
 namespace vdvr {
 
 /// Radians a node: filters are designed for no more.
@@ -35,6 +37,9 @@ struct GoldFilter {
 
   [[nodiscard]] int first() const { return 1 - taps / 2; }
 };
+
+/// The filter at a phase as a functional of its nodes, the one on the left at 0.
+NodeFunctional functional(const GoldFilter& filter, int phase);
 
 /// Nearly minimax over the band (iteratively reweighted least squares), in double precision, then rounded.
 /// The weights add to 1 but for `error`. A band that fewer taps would do is widened to what these do with

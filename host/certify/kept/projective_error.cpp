@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "host/base/system/parallel.hpp"
-#include "host/certify/bounds/node_functional.hpp"
 
 namespace vdvr {
 namespace {
@@ -16,15 +15,6 @@ namespace {
 constexpr std::size_t bands = 24, moments = most_moments;
 // Sums of fewer than a thousand products of numbers >= 0, in double precision.
 constexpr double rounding = 1 + 0x1p-40;
-
-// The filter at `phase`, which stands for the value itself.
-NodeFunctional functional(const GoldFilter& filter, int phase) {
-  NodeFunctional f;
-  f.first = filter.first() - static_cast<double>(phase) / filter.rate;
-  for (int i = 0; i < filter.taps; ++i)
-    f.taps.push_back(static_cast<double>(filter.weights[static_cast<std::size_t>(phase * filter.taps + i)]));
-  return f;
-}
 
 std::vector<double> all_bands(double highest) {
   std::vector<double> out;

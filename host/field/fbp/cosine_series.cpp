@@ -8,7 +8,7 @@
 namespace vdvr {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 // The derivative of g at d, by its sum.
 double derivative(std::int64_t n, double d, int order, double pitch) {

@@ -43,7 +43,7 @@ double stored_rounding(double largest) {
   return is_double<Real> ? u / (1 - u) * largest : 0.0;
 }
 
-cl_int to_int(std::int64_t n) {
+cl_int checked_int(std::int64_t n) {
   if (n > INT32_MAX) throw InputError(fmt::format("a size of {} passes 2^31", n));
   return static_cast<cl_int>(n);
 }
@@ -125,8 +125,8 @@ class FourierFilter : public RowFilter {
       chunk.rows.write(rows.subspan(at, n));
       chunk.filter();
       crop({{count(g_.rows), count(g_.columns), count(chunk.views)}, {1, 64, 1}}, chunk.rows.buffer(),
-           chunk.padded.buffer(), chunk.weights.buffer(), to_int(g_.columns), to_int(g_.rows),
-           to_int(length_), to_int(chunk.views));
+           chunk.padded.buffer(), chunk.weights.buffer(), checked_int(g_.columns), checked_int(g_.rows),
+           checked_int(length_), checked_int(chunk.views));
       chunk.rows.read(out.subspan(at, n));
     }
   }
@@ -149,15 +149,15 @@ class FourierFilter : public RowFilter {
       broken.fill(0);
       const VdvrFilteredRows shape{.out = {count(chunk.first * target.count * 16), count(target.count * 16),
                                            count(g_.views() * target.count * 16)},
-                                   .columns = to_int(g_.columns),
-                                   .z_padded = to_int(z_padded),
-                                   .views = to_int(chunk.views),
+                                   .columns = checked_int(g_.columns),
+                                   .z_padded = checked_int(z_padded),
+                                   .views = checked_int(chunk.views),
                                    .offset = 0,
-                                   .first_column = to_int(target.first),
-                                   .out_columns = to_int(target.count)};
+                                   .first_column = checked_int(target.first),
+                                   .out_columns = checked_int(target.count)};
       crop({{count(z_padded), count(target.count), count(chunk.views)}, {16, 4, 1}}, target.values->buffer(),
-           broken.buffer(), chunk.padded.buffer(), chunk.weights.buffer(), to_int(height), to_int(length_),
-           shape);
+           broken.buffer(), chunk.padded.buffer(), chunk.weights.buffer(), checked_int(height),
+           checked_int(length_), shape);
       const std::vector<cl_int> found = broken.to_host();
       for (std::int64_t k = 0; k < chunk.views; ++k)
         if (found[static_cast<std::size_t>(k)] != 0) throw not_finite(chunk.first + k);
@@ -202,11 +202,11 @@ class FourierFilter : public RowFilter {
     void filter() {
       constexpr auto precision = is_double<Real> ? Precision::fp64 : Precision::fp32;
       const std::int64_t n = most_views * height;
-      pad({{count(f.length_), count(n), 1}, {64, 1, 1}}, padded.buffer(), rows.buffer(), to_int(f.g_.columns),
-          to_int(f.length_), to_int(n));
+      pad({{count(f.length_), count(n), 1}, {64, 1, 1}}, padded.buffer(), rows.buffer(),
+          checked_int(f.g_.columns), checked_int(f.length_), checked_int(n));
       fft::forward_real(f.state_, precision, f.length_, n, padded.buffer(), transformed.buffer());
       multiply({{count(bins), count(n), 1}, {64, 1, 1}}, transformed.buffer(), spectrum.buffer(),
-               to_int(bins), to_int(n));
+               checked_int(bins), checked_int(n));
       fft::inverse_real(f.state_, precision, f.length_, n, transformed.buffer(), padded.buffer());
     }
 
@@ -434,12 +434,12 @@ class ProductFilter : public RowFilter {
          {"VDVR_STEP", std::to_string(step_)},
          {"VDVR_DOUBLE", is_double<Real> ? "1" : "0"}});
     const VdvrFilteredRows shape{.out = places,
-                                 .columns = to_int(g_.columns),
-                                 .z_padded = to_int(chunk.z_padded),
-                                 .views = to_int(chunk.views),
-                                 .offset = to_int(offset_),
-                                 .first_column = to_int(first_column),
-                                 .out_columns = to_int(out_columns)};
+                                 .columns = checked_int(g_.columns),
+                                 .z_padded = checked_int(chunk.z_padded),
+                                 .views = checked_int(chunk.views),
+                                 .offset = checked_int(offset_),
+                                 .first_column = checked_int(first_column),
+                                 .out_columns = checked_int(out_columns)};
     const std::int64_t groups = (g_.columns + 8 * step_ - 1) / (8 * step_) * step_;
     kernel({{count(chunk.z_padded / lanes), count(groups), count(chunk.views)},
             {tuning.local[0], tuning.local[1], 1}},

@@ -14,7 +14,7 @@
 namespace vdvr {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 // The window at a fraction r of the cutoff frequency, 0 <= r <= 1.
 std::function<double(double)> window(RampWindow of) {

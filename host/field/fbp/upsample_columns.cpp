@@ -19,7 +19,7 @@ static_assert(sizeof(VdvrFinerColumns) == 88);
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 constexpr std::uint64_t most_scratch = std::uint64_t{256} << 20;
 
 // The convolution's values at -columns .. columns do not meet those of another period.

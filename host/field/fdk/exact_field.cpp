@@ -22,7 +22,7 @@
 namespace vdvr {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 // cos(pi m (i + 1/2) / n) for all m, i: [m][i].
 std::vector<double> cosine_table(std::int64_t n) {

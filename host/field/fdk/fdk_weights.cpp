@@ -16,7 +16,7 @@
 namespace vdvr {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 double degrees(double radians) { return radians * 180 / pi; }
 

@@ -15,7 +15,7 @@
 namespace vdvr {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 // The median of chi^2 with one degree of freedom.
 constexpr double median_of_chi2 = 0.454936423119572;
 // As many samples give the median to a few thousandths.

@@ -18,8 +18,8 @@
 namespace vdvr {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-constexpr std::int64_t most_samples = std::int64_t{1} << 22, most_rows = 64, fewest_rows = 4;
+using std::numbers::pi;
+constexpr std::int64_t most_looked_at = std::int64_t{1} << 22, most_rows = 64, fewest_rows = 4;
 constexpr std::int64_t frequencies = 64, most_lags = 4;
 
 // Which of the prepared rows and views are looked at.
@@ -35,10 +35,10 @@ Window window_of(const ProjectionSet& prepared) {
   Window out;
   std::int64_t views = g.views();
   if (p.stripes) {
-    out.rows = std::min(g.rows, std::clamp(most_samples / (of_row * views), fewest_rows, most_rows));
+    out.rows = std::min(g.rows, std::clamp(most_looked_at / (of_row * views), fewest_rows, most_rows));
   } else {
     out.rows = std::min(g.rows, most_rows);
-    views = std::clamp<std::int64_t>(most_samples / (of_row * out.rows), 1, views);
+    views = std::clamp<std::int64_t>(most_looked_at / (of_row * out.rows), 1, views);
   }
   out.first_row = (g.rows - out.rows) / 2;
   for (std::int64_t k = 0; k < views; ++k) out.views.push_back((2 * k + 1) * g.views() / (2 * views));

@@ -16,7 +16,7 @@ std::optional<RingNoise> ring_noise(const ProjectionSet& scan, std::int64_t flat
   if (scan.cone || flats < 1) return std::nullopt;
   const auto& theta = scan.geometry.theta_rad;
   const auto [low, high] = std::minmax_element(theta.begin(), theta.end());
-  constexpr double pi = std::numbers::pi;
+  using std::numbers::pi;
   const double seen_twice = std::clamp((*high - *low) / pi, 1.0, 2.0);
   // A flat's pixel counts what the open beam has, a view's e^-p of that.
   const auto size = static_cast<std::int64_t>(scan.data.size()),

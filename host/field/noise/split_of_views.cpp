@@ -17,8 +17,8 @@
 namespace vdvr {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-constexpr std::int64_t most_rows = 8, most_cells = 128, fewest_samples = 50;
+using std::numbers::pi;
+constexpr std::int64_t planes = 8, most_cells = 128, fewest_samples = 50;
 // Pixels about the axis that hold enough samples to go by.
 constexpr double least_radius = 5;
 // Beyond it a column's median is the object, not its noise or a bent background.
@@ -47,7 +47,7 @@ Middle middle_rows(const ProjectionSet& scan, const LineIntegralNoise& noise) {
   // Of cone beam the plane of the orbit alone is looked at, and the rows that see it.
   double row = 0.5 * static_cast<double>(g.rows - 1);
   if (scan.cone) row = cone_view(scan.cone->views.front()).row;
-  const std::int64_t rows = std::min(g.rows, most_rows),
+  const std::int64_t rows = std::min(g.rows, planes),
                      first = std::clamp<std::int64_t>(std::llround(row) - rows / 2, 0, g.rows - rows);
   out.scan.geometry.rows = rows;
   out.height = std::round(row) - row;

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 constexpr std::int64_t most_numbers = std::int64_t{1} << 26;
 constexpr std::size_t most_axes = 4;
 
-struct Header {
+struct NpyHeader {
   std::string type;
   bool fortran = false;
   std::vector<std::int64_t> shape;
@@ -33,8 +33,8 @@ class HeaderReader {
  public:
   HeaderReader(const fs::path& path, std::string_view text) : path_(path), text_(text) {}
 
-  Header read() {
-    Header out;
+  NpyHeader read() {
+    NpyHeader out;
     std::array<bool, 3> seen{};
     need('{');
     while (!take('}')) {
@@ -180,7 +180,7 @@ std::string whole_file(const fs::path& path) {
 NpyArray read_npy(const fs::path& path) {
   const std::string bytes = whole_file(path);
   const auto [text, start] = header_of(path, bytes);
-  const Header header = HeaderReader(path, text).read();
+  const NpyHeader header = HeaderReader(path, text).read();
   const bool wide = header.type == "<f8";
   if (!wide && header.type != "<f4")
     throw FileError(fmt::format("{}: numbers of type '{}'; save as little-endian float64 or float32",

@@ -33,9 +33,9 @@ std::string trimmed(const std::string& text) {
 }
 
 // What a header may hold, parsed: the fields, and where the samples start when they follow it.
-class Header {
+class HeaderText {
  public:
-  explicit Header(const fs::path& path) : path_(path), file_(path, std::ios::binary) {
+  explicit HeaderText(const fs::path& path) : path_(path), file_(path, std::ios::binary) {
     std::error_code error;
     if (!fs::is_regular_file(path, error) || !file_)
       throw FileError(path.string() + ": no such file, or not readable");
@@ -135,7 +135,7 @@ class Header {
   std::size_t read_ = 0;
 };
 
-void set_spacing(const Header& header, RasterHeader& out, const std::vector<double>& spacing) {
+void set_spacing(const HeaderText& header, RasterHeader& out, const std::vector<double>& spacing) {
   for (std::size_t a = 0; a < 3; ++a) {
     if (std::isnan(spacing[a])) continue;  // not known, as NRRD has it
     if (!(spacing[a] > 0))
@@ -144,7 +144,7 @@ void set_spacing(const Header& header, RasterHeader& out, const std::vector<doub
   }
 }
 
-void set_axes(const Header& header, const std::string& key, const AxisDirections& directions,
+void set_axes(const HeaderText& header, const std::string& key, const AxisDirections& directions,
               RasterHeader& out) {
   if (const std::string wrong = straight_axes(directions, out.samples, out.spacing, out.axes); !wrong.empty())
     header.fail(fmt::format("'{}' {}", key, wrong));
@@ -152,7 +152,7 @@ void set_axes(const Header& header, const std::string& key, const AxisDirections
 
 // --- MetaImage ---
 
-void set_met_type(const Header& header, const std::string& name, RasterHeader& out) {
+void set_met_type(const HeaderText& header, const std::string& name, RasterHeader& out) {
   using enum ScalarKind;
   static const std::map<std::string, std::pair<ScalarKind, int>> types{
       {"MET_CHAR", {signed_integer, 1}},      {"MET_UCHAR", {unsigned_integer, 1}},
@@ -168,7 +168,7 @@ void set_met_type(const Header& header, const std::string& name, RasterHeader& o
   out.sample_bytes = it->second.second;
 }
 
-void set_met_geometry(const Header& header, RasterHeader& out) {
+void set_met_geometry(const HeaderText& header, RasterHeader& out) {
   for (const char* key : {"Offset", "Position", "Origin"})
     if (header.find(key)) {
       const auto origin = header.numbers(key, 3);
@@ -192,7 +192,7 @@ void set_met_geometry(const Header& header, RasterHeader& out) {
     out.unit = comment->substr(mark.size());
 }
 
-RasterHeader read_meta_image(Header& header) {
+RasterHeader read_meta_image(HeaderText& header) {
   std::string text;
   bool complete = false;
   while (!complete && header.line(text)) {
@@ -233,7 +233,7 @@ RasterHeader read_meta_image(Header& header) {
 
 // --- NRRD ---
 
-void set_nrrd_type(const Header& header, const std::string& name, RasterHeader& out) {
+void set_nrrd_type(const HeaderText& header, const std::string& name, RasterHeader& out) {
   using enum ScalarKind;
   static const std::map<std::string, std::pair<ScalarKind, int>> types = [] {
     std::map<std::string, std::pair<ScalarKind, int>> t;
@@ -259,7 +259,7 @@ void set_nrrd_type(const Header& header, const std::string& name, RasterHeader& 
   out.sample_bytes = it->second.second;
 }
 
-void set_nrrd_geometry(const Header& header, RasterHeader& out) {
+void set_nrrd_geometry(const HeaderText& header, RasterHeader& out) {
   for (const char* key : {"axis mins", "axismins", "axis maxs", "axismaxs"})
     if (header.find(key))
       header.fail(fmt::format("'{}' is not supported; give 'space origin' and 'space directions'", key));
@@ -302,7 +302,7 @@ std::uint64_t after_lines(const fs::path& path, std::uint64_t from, std::int64_t
   }
 }
 
-RasterHeader read_nrrd(Header& header) {
+RasterHeader read_nrrd(HeaderText& header) {
   std::string text;
   header.line(text);  // the magic, checked by the caller
   while (header.line(text) && !text.empty()) {
@@ -472,7 +472,7 @@ bool is_raster_file(const fs::path& path) {
 }
 
 RasterHeader read_raster_header(const fs::path& path) {
-  Header header(path);
+  HeaderText header(path);
   if (!is_raster_file(path)) header.fail("is neither MetaImage (.mha) nor NRRD");
   std::ifstream file(path, std::ios::binary);
   char first = 0;

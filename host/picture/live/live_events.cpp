@@ -16,8 +16,6 @@ constexpr double kWheelPerOctave = 800, kWheelPerSlice = 100;
 constexpr double kFarthest = 1e5;  // pixels
 constexpr double kLeastZoom = 0.25, kMostZoom = 64, kMostPan = 2;
 
-bool is_flat(const LiveView& v) { return v.mode == RenderMode::slice || v.mode == RenderMode::error; }
-
 void turn(LiveView& v, double right_deg, double up_deg) {
   // What the hand pulls to the right goes there when the camera goes to its left.
   v.azimuth_deg = std::remainder(v.azimuth_deg - right_deg, 360.0);
@@ -55,7 +53,7 @@ void move_window(LiveView& v, const LiveScene& scene, double wider, double brigh
 
 /// Along an axis, with the other two where slices across it have them.
 void look_along(LiveView& v, const LiveScene& scene, int axis) {
-  if (is_flat(v)) {
+  if (v.is_flat()) {
     v.slice_axis = axis;
     v.slice_position = scene.brightness.dense_center[static_cast<std::size_t>(axis)];
     return;
@@ -77,7 +75,7 @@ void first_camera(LiveState& s, const LiveScene& scene) {
 
 LiveDrag drag_of(const LiveView& v, const LiveEvent& e) {
   const bool left = e.button == 1;
-  if (is_flat(v)) {
+  if (v.is_flat()) {
     if (e.button == 2 || (left && e.control)) return LiveDrag::window;
     return left || e.button == 3 ? LiveDrag::slice : LiveDrag::none;
   }
@@ -125,7 +123,7 @@ void set_mode(LiveView& v, const LiveScene& scene, RenderMode mode) {
 }
 
 void arrow(LiveView& v, const LiveScene& scene, int right, int up) {
-  if (is_flat(v)) move_slice_by_cells(v, scene, right + up);
+  if (v.is_flat()) move_slice_by_cells(v, scene, right + up);
   else turn(v, right * kKeyDegrees, up * kKeyDegrees);
 }
 
@@ -157,7 +155,7 @@ void press(LiveState& s, const LiveEvent& e, const LiveScene& scene) {
 
 void roll(LiveState& s, const LiveEvent& e, const LiveScene& scene) {
   const double dy = std::clamp(e.dy, -10000.0, 10000.0);
-  if (is_flat(s.view)) move_slice_by_cells(s.view, scene, -dy / kWheelPerSlice);
+  if (s.view.is_flat()) move_slice_by_cells(s.view, scene, -dy / kWheelPerSlice);
   else zoom(s.view, std::exp2(-dy / kWheelPerOctave));
 }
 

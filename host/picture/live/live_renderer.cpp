@@ -20,8 +20,6 @@ namespace {
 constexpr std::int64_t kLeastSide = 32;
 constexpr int kCoarsest = 16;  // quarter octaves of the side: a sixteenth
 
-bool is_flat(const LiveView& v) { return v.mode == RenderMode::slice || v.mode == RenderMode::error; }
-
 /// Each pixel the mean of both pictures where `known` says something. `colours` may be higher than `image`.
 void mix(Image& image, const Image& colours, const FloatImage& known) {
   for (std::size_t i = 0; i < known.values.size(); ++i) {
@@ -107,7 +105,7 @@ struct LiveRenderer::Impl {
     if (moving) o.step_mode = StepMode::fixed;
     Image image = renderer.render(o).image;
     if (!v.bound) return image;
-    if (is_flat(v)) {
+    if (v.is_flat()) {
       const ErrorSlice bounds = bounds_of_slice(v, width, height, false);
       mix(image, bounds.image, bounds.errors);
       return image;

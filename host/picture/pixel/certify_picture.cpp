@@ -31,7 +31,7 @@ double share_within(const PixelBounds& b, const Image& drawn, double levels) {
   check_size(b, drawn);
   const std::size_t pixels = b.parts.size();
   std::size_t within = 0;
-  for (std::size_t i = 0; i < pixels; ++i) within += bytes_off(b, drawn, i) <= levels ? 1 : 0;
+  for (std::size_t i = 0; i < pixels; ++i) within += bytes_off(b, drawn, i) <= levels ? 1U : 0U;
   return pixels == 0 ? 1 : static_cast<double>(within) / static_cast<double>(pixels);
 }
 

@@ -6,7 +6,7 @@ namespace vdvr {
 namespace {
 
 // Three roundings of an opacity between two points.
-constexpr double rounding = 0x1p-50;
+constexpr double of_opacity = 0x1p-50;
 
 double extinction(double opacity) {
   if (!(opacity > 0)) return 0;
@@ -54,8 +54,8 @@ MediumRange MediumRanges::over(double low, double high) const {
   for (std::size_t i = 0; i + 1 < points_.size(); ++i)
     if (points_[i + 1].value >= low && points_[i].value <= high) stretch(points_[i], points_[i + 1]);
   // Near opacity 1 extinction makes much of a rounding; only where all is opaque, nothing shines through.
-  out.tau_low = opaque ? infinity : extinction(least - rounding);
-  out.tau_high = most > 0 ? extinction(most + rounding) : 0;
+  out.tau_low = opaque ? infinity : extinction(least - of_opacity);
+  out.tau_high = most > 0 ? extinction(most + of_opacity) : 0;
   return out;
 }
 

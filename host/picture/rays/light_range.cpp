@@ -10,7 +10,7 @@
 namespace vdvr {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 double to_the_24th(double x) { return std::pow(x, 24); }
 

@@ -111,7 +111,7 @@ std::vector<float> PictureRounds::look(const RayField& field, const PictureViews
     grade_bounds(asked, bricks);
     // What is asked already, and what closing and rounding make of it anyway.
     constexpr float same = 0.98f;
-    for (std::size_t i = 0; i < asked.size(); ++i) round.asked += asked[i] < same * bounds[i] ? 1 : 0;
+    for (std::size_t i = 0; i < asked.size(); ++i) round.asked += asked[i] < same * bounds[i] ? 1U : 0U;
     if (round.asked == 0) asked.clear();
   }
   rounds_.push_back(round);

@@ -13,7 +13,7 @@
 namespace vdvr {
 namespace {
 
-constexpr std::int64_t most_pixels = 4096;
+constexpr std::int64_t longest_side = 4096;
 constexpr std::size_t most_views = 1000;
 
 void refuse(const io::Description& view, std::initializer_list<const char*> names, const char* why) {
@@ -51,9 +51,9 @@ WantedView view_of(const io::Description& view) {
 
 void read_size(const io::Description& file, WantedViews& out) {
   const auto size = file.numbers("size");
-  const auto good = [](double n) { return n >= 1 && n <= most_pixels && n == std::floor(n); };
+  const auto good = [](double n) { return n >= 1 && n <= longest_side && n == std::floor(n); };
   if (size.size() != 2 || !good(size[0]) || !good(size[1]))
-    file.fail(fmt::format("'size' must be [width, height], each 1 to {}", most_pixels));
+    file.fail(fmt::format("'size' must be [width, height], each 1 to {}", longest_side));
   out.width = static_cast<std::int64_t>(size[0]);
   out.height = static_cast<std::int64_t>(size[1]);
 }

@@ -1,5 +1,4 @@
 // Cameras, and the one check of them.
-#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -11,10 +10,6 @@
 
 namespace vdvr {
 namespace {
-
-bool is_finite(const Vec3& v) {
-  return std::all_of(v.begin(), v.end(), [](double x) { return std::isfinite(x); });
-}
 
 // Of vectors that are not 0.
 bool are_parallel(const glm::dvec3& a, const glm::dvec3& b) {

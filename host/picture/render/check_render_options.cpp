@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 
@@ -12,10 +11,6 @@
 
 namespace vdvr {
 namespace {
-
-bool is_finite(const Vec3& v) {
-  return std::all_of(v.begin(), v.end(), [](double x) { return std::isfinite(x); });
-}
 
 void check_transfer(const TransferFunction& f) {
   if (f.points.empty()) throw InputError(fmt::format("transfer function '{}' has no points", f.name));

@@ -23,7 +23,7 @@ constexpr std::int64_t kMostBlocks = 128;
 // Extinction of a block alone that is seen, and of all blocks behind each other that are not: 16 and 25
 // levels of 8 bits between black and white. Noise of the air stays below.
 constexpr double kSeenAlone = 1.0 / 16, kSeenTogether = 1.0 / 10;
-constexpr double kOpaque = 4;  // extinction: two percent pass
+constexpr double kHides = 4;  // extinction: two percent pass
 constexpr double kSpeckWeight = 1e-3, kSpeckSide = 1.0 / 16;
 constexpr double kMargin = 0.95;
 constexpr double kDegree = std::numbers::pi / 180;
@@ -38,7 +38,7 @@ class Extinction {
       double most = 0;
       for (int k = 0; k <= 4; ++k)
         most = std::max(most, transfer_at(f.points, lo_ + (i + k / 4.0) / scale_).opacity);
-      table_.push_back(most < 1 ? std::min(kOpaque, -std::log1p(-most)) : kOpaque);
+      table_.push_back(most < 1 ? std::min(kHides, -std::log1p(-most)) : kHides);
     }
   }
   [[nodiscard]] double operator()(float value) const {
@@ -112,7 +112,7 @@ Blocks seen_blocks(const Grid& grid, const std::vector<float>& samples, const Re
       const float x = samples[at(i)], y = samples[at(i + stride[a])];
       for (const IsoSurface& s : o.surfaces) {
         const auto value = static_cast<float>(s.value);
-        if ((x >= value) != (y >= value)) return kOpaque;
+        if ((x >= value) != (y >= value)) return kHides;
       }
     }
     return 0.0;

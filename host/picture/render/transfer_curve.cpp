@@ -8,7 +8,7 @@ namespace vdvr {
 namespace {
 
 // Pieces of a bent segment: 8-bit colours along one differ by less than a step from its chords.
-constexpr int kPieces = 32;
+constexpr int kBends = 32;
 // Below it VTK takes a piece as straight.
 constexpr double kStraight = 0.01;
 // Above it VTK takes a piece of colour as a step.
@@ -60,7 +60,7 @@ std::vector<double> breaks(const CurveNode<Value>& node, bool straight_space) {
     if (node.midpoint > 0 && node.midpoint < 1 && node.midpoint != 0.5) out.push_back(node.midpoint);
     return out;
   }
-  for (int i = 1; i < kPieces; ++i) out.push_back(static_cast<double>(i) / kPieces);
+  for (int i = 1; i < kBends; ++i) out.push_back(static_cast<double>(i) / kBends);
   return out;
 }
 

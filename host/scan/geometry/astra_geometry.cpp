@@ -17,8 +17,8 @@ DetectorVectors vectors_of(const double* values) {
   return {vector(0), vector(1), vector(2), vector(3)};
 }
 
-void circular_views(const Description& about, const std::string& where, const StackShape& stack,
-                    ConeViews& out) {
+void astra_circular_views(const Description& about, const std::string& where, const StackShape& stack,
+                          ConeViews& out) {
   CircularView view;
   view.source_to_axis = about.positive("DistanceOriginSource");
   const double behind = about.number("DistanceOriginDetector");
@@ -51,7 +51,7 @@ ConeViews astra_geometry(const std::filesystem::path& path, const StackShape& st
   ConeViews out;
   out.center_source = "file";
   if (type == "cone") {
-    circular_views(about, where, stack, out);
+    astra_circular_views(about, where, stack, out);
     out.notes.emplace_back("ASTRA's rows are taken in the stack's order, [view][row][column]");
     return out;
   }

@@ -4,13 +4,11 @@
 
 #include <fmt/format.h>
 
-#include <numbers>
 #include <tuple>
+#include "host/base/system/casts.hpp"
 
 namespace vdvr::io {
 namespace {
-
-constexpr double radians = std::numbers::pi / 180;
 
 int sense_of(const Description& about, std::vector<std::string>& notes) {
   if (!about.has("sense")) {
@@ -47,12 +45,12 @@ ConeViews circular_geometry(const Description& about, const StackShape& stack,
   if (about.has("tilt")) {
     if (!about.is_list("tilt")) about.fail(about.quoted("tilt") + " must be [in plane, out of plane]");
     const auto [in_plane, out_of_plane] = about.pair("tilt");
-    view.in_plane_rad = in_plane * radians;
-    view.out_of_plane_rad = out_of_plane * radians;
+    view.in_plane_rad = in_plane * radians_per_degree;
+    view.out_of_plane_rad = out_of_plane * radians_per_degree;
   }
   const int sense = sense_of(about, out.notes);
   std::vector<double> theta_rad;
-  for (const double theta : theta_deg) theta_rad.push_back(theta * radians);
+  for (const double theta : theta_deg) theta_rad.push_back(theta * radians_per_degree);
   require_radians(where, "angles", theta_rad, not_radians);
   for (std::size_t k = 0; k < theta_rad.size(); ++k) {
     view.theta_rad = sense * theta_rad[k];

@@ -6,17 +6,15 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <numbers>
 #include <set>
 
+#include "host/base/system/casts.hpp"
 #include "host/base/system/lower.hpp"
 #include "host/scan/geometry/description.hpp"
 #include "host/scan/geometry/vectors.hpp"
 
 namespace vdvr::io {
 namespace {
-
-constexpr double radians = std::numbers::pi / 180;
 
 const std::set<std::string> known_members{
     "geometry",      "numAngles",       "numRows",   "numCols",      "pixelHeight", "pixelWidth",
@@ -50,7 +48,7 @@ bool is_modular(const Description& about) {
 }
 
 // Degrees: a list, or the range over which numAngles are spread as setAngleArray does it.
-std::vector<double> angles_of(const Description& about, const StackShape& stack) {
+std::vector<double> leap_angles(const Description& about, const StackShape& stack) {
   if (about.has("phis") == about.has("angularRange")) about.fail("needs one of 'phis' and 'angularRange'");
   if (about.has("phis") && about.is_list("phis")) {
     std::vector<double> angles = about.numbers("phis");
@@ -66,17 +64,17 @@ std::vector<double> angles_of(const Description& about, const StackShape& stack)
 }
 
 // A view at angle 0 and without a shift, turned by `tilt` about the ray through the detector's (center, row).
-void circular_views(const Description& about, const std::string& where, const StackShape& stack,
-                    ConeViews& out) {
+void leap_circular_views(const Description& about, const std::string& where, const StackShape& stack,
+                         ConeViews& out) {
   const double sod = about.positive("sod"), sdd = about.positive("sdd"), tau = about.number_or("tau", 0),
-               tilt = about.number_or("tiltAngle", 0) * radians, width = about.positive("pixelWidth"),
-               height = about.positive("pixelHeight");
+               tilt = about.number_or("tiltAngle", 0) * radians_per_degree,
+               width = about.positive("pixelWidth"), height = about.positive("pixelHeight");
   // From where the ray at right angles hits the detector to its middle.
   const double across = width * (stack.middle_column() - about.number("centerCol")),
                along = height * (stack.middle_row() - about.number("centerRow"));
-  const std::vector<double> angles = angles_of(about, stack);
+  const std::vector<double> angles = leap_angles(about, stack);
   for (std::size_t k = 0; k < angles.size(); ++k) {
-    const double s = std::sin(angles[k] * radians), c = std::cos(angles[k] * radians);
+    const double s = std::sin(angles[k] * radians_per_degree), c = std::cos(angles[k] * radians_per_degree);
     const Vec3 column{c, s, 0}, away{s, -c, 0};
     DetectorVectors d;
     const Vec3 u{column[0] * std::cos(tilt), column[1] * std::cos(tilt), std::sin(tilt)},
@@ -134,7 +132,7 @@ ConeViews leap_geometry(const std::filesystem::path& path, const StackShape& sta
   out.center_source = "file";
   out.unit = "mm";
   if (modular) modular_views(about, where, stack, out);
-  else circular_views(about, where, stack, out);
+  else leap_circular_views(about, where, stack, out);
   out.notes.emplace_back(modular
                              ? "LEAP's rowVectors point from row to row, its colVectors from column to column"
                              : "LEAP's phis are assumed to be degrees, at 0 with the source at -y");

@@ -8,9 +8,9 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <sstream>
 
+#include "host/base/system/casts.hpp"
 #include "host/files/io/number_text.hpp"
 #include "host/files/io/text_encoding.hpp"
 #include "host/files/io/volume_stack.hpp"
@@ -20,7 +20,6 @@ namespace vdvr::io {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr double degrees = 180 / std::numbers::pi;
 
 // The members of section XTekCT, and of lines before any section.
 class Members {
@@ -162,16 +161,16 @@ ConeViews nikon_geometry(const NikonScan& n, const StackShape& stack) {
   const double on_detector = n.object_offset ? *n.object_offset * n.source_to_detector / n.source_to_object
                                              : 0.5 * (n.center_top + n.center_bottom);
   view.in_plane_rad =
-      n.object_roll ? *n.object_roll / degrees
+      n.object_roll ? *n.object_roll / degrees_per_radian
                     : std::atan2(n.center_bottom - n.center_top, static_cast<double>(n.rows) * n.pixel_y);
-  view.out_of_plane_rad = -n.object_tilt / degrees;
+  view.out_of_plane_rad = -n.object_tilt / degrees_per_radian;
   // The axis moves, not the detector: the source's axis still hits the detector's middle.
   view.center = stack.middle_column();
   view.source_offset_u = -on_detector * n.source_to_object / n.source_to_detector;
   view.detector_offset_u = view.source_offset_u;
   ConeViews out;
   for (std::int64_t i = 0; i < n.projections; ++i) {
-    view.theta_rad = -(n.initial_angle + static_cast<double>(i) * n.angular_step) / degrees;
+    view.theta_rad = -(n.initial_angle + static_cast<double>(i) * n.angular_step) / degrees_per_radian;
     out.views.push_back(checked_view(view, n.path.string(), i));
   }
   out.center_source = "file";

@@ -11,6 +11,7 @@
 #include <pugixml.hpp>
 #include <string_view>
 
+#include "host/base/system/casts.hpp"
 #include "host/files/io/number_text.hpp"
 #include "host/files/io/text_encoding.hpp"
 #include "host/scan/geometry/vectors.hpp"
@@ -19,7 +20,6 @@
 namespace vdvr {
 namespace {
 
-constexpr double degrees = 180 / std::numbers::pi;
 // Of circular_parameters: what rounding leaves of a matrix that has parameters.
 constexpr double same_matrix = 1e-9;
 
@@ -112,9 +112,9 @@ std::string rtk_geometry_text(const ConeGeometry& cone, const StackPlace& stack)
     for (const auto& [name, value] :
          {std::pair<const char*, double>{"SourceToIsocenterDistance", v.source_to_axis},
           {"SourceToDetectorDistance", v.source_to_detector},
-          {"GantryAngle", gantry * degrees},
-          {"OutOfPlaneAngle", v.out_of_plane_rad * degrees},
-          {"InPlaneAngle", v.in_plane_rad * degrees},
+          {"GantryAngle", gantry * degrees_per_radian},
+          {"OutOfPlaneAngle", v.out_of_plane_rad * degrees_per_radian},
+          {"InPlaneAngle", v.in_plane_rad * degrees_per_radian},
           {"SourceOffsetX", v.source_offset_u},
           {"SourceOffsetY", v.source_offset_v},
           {"ProjectionOffsetX", v.detector_offset_u},
@@ -260,11 +260,11 @@ class RtkReader {
                                 "'angles' instead of 'rtk_geometry'",
                                 k));
     CircularView view;
-    view.theta_rad = p.gantry / degrees;
+    view.theta_rad = p.gantry / degrees_per_radian;
     view.source_to_axis = p.sid;
     view.source_to_detector = p.sdd;
-    view.in_plane_rad = p.in_plane / degrees;
-    view.out_of_plane_rad = p.out_of_plane / degrees;
+    view.in_plane_rad = p.in_plane / degrees_per_radian;
+    view.out_of_plane_rad = p.out_of_plane / degrees_per_radian;
     view.source_offset_u = p.source_x;
     view.source_offset_v = p.source_y;
     view.detector_offset_u = p.projection_x;

@@ -42,7 +42,7 @@ std::vector<double> rows_by_view(const Description& about, const std::string& ke
 }
 
 // Radians about the axis of rotation; angles about two more axes must be 0.
-std::vector<double> angles_of(const Description& about, const StackShape& stack) {
+std::vector<double> tigre_angles(const Description& about, const StackShape& stack) {
   if (!about.has("angles") || !about.is_table("angles")) {
     const std::vector<double> angles = about.numbers("angles");
     if (static_cast<std::int64_t>(angles.size()) != stack.views)
@@ -84,7 +84,7 @@ ConeViews tigre_geometry(const std::filesystem::path& path, const StackShape& st
     about.fail(fmt::format("'nDetector' is [{}, {}], but the projections have {} rows x {} columns", count[0],
                            count[1], stack.rows, stack.columns));
   const auto sdd = by_view(about, "DSD", stack), sid = by_view(about, "DSO", stack),
-             angles = angles_of(about, stack), offsets = rows_by_view(about, "offDetector", 2, stack),
+             angles = tigre_angles(about, stack), offsets = rows_by_view(about, "offDetector", 2, stack),
              shift =
                  about.has("COR") ? by_view(about, "COR", stack) : std::vector<double>(angles.size(), 0.0);
   require_radians(path.string(), "'angles'", angles);

@@ -13,7 +13,7 @@ namespace vdvr {
 namespace {
 
 // A window of thousands of pixels would take hours and leave nothing of the picture.
-constexpr int widest = 1001, widest_square = 31, most_binning = 64;
+constexpr int widest_line = 1001, widest_square = 31, most_binning = 64;
 constexpr double widest_blur = 100;  // pixels
 
 void require_odd(const char* what, int value, int most) {
@@ -41,8 +41,8 @@ void check_preparation(const Preparation& p) {
   }
   if (p.stripes) {
     require_positive("stripes: the ratio", p.stripes->ratio);
-    if (p.stripes->large != 0) require_odd("stripes: the large window", p.stripes->large, widest);
-    if (p.stripes->small != 0) require_odd("stripes: the small window", p.stripes->small, widest);
+    if (p.stripes->large != 0) require_odd("stripes: the large window", p.stripes->large, widest_line);
+    if (p.stripes->small != 0) require_odd("stripes: the small window", p.stripes->small, widest_line);
   }
   require_odd("median: the window", p.median, widest_square);
   for (const double sigma : p.gaussian)

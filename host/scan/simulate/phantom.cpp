@@ -10,9 +10,9 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <utility>
 
+#include "host/base/system/casts.hpp"
 #include "host/scan/geometry/description.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/simulate.hpp"
@@ -22,8 +22,6 @@ namespace {
 
 using nlohmann::json;
 
-double radians(double degrees) { return degrees * (std::numbers::pi / 180); }
-
 // An ellipsoid seen from one direction.
 struct Shadow {
   double t0;      // where its centre falls on the detector
@@ -32,8 +30,8 @@ struct Shadow {
 
   Shadow(const Ellipsoid& e, double theta)
       : t0(e.center[0] * std::cos(theta) + e.center[1] * std::sin(theta)) {
-    const double c = e.semi_axes[0] * std::cos(theta - radians(e.phi_deg));
-    const double s = e.semi_axes[1] * std::sin(theta - radians(e.phi_deg));
+    const double c = e.semi_axes[0] * std::cos(theta - e.phi_deg * radians_per_degree);
+    const double s = e.semi_axes[1] * std::sin(theta - e.phi_deg * radians_per_degree);
     half2 = c * c + s * s;
     factor = e.density * 2 * e.semi_axes[0] * e.semi_axes[1] / half2;
   }
@@ -68,7 +66,7 @@ double chord(const Ellipsoid& e, double theta, double u, double v) {
 // Of a whole line: in coordinates in which the ellipsoid is the unit ball, its part within is between the
 // roots of |p + s d|^2 = 1.
 double chord_of_line(const Ellipsoid& e, const Vec3& point, const Vec3& direction) {
-  const double c = std::cos(radians(e.phi_deg)), s = std::sin(radians(e.phi_deg));
+  const double c = std::cos(e.phi_deg * radians_per_degree), s = std::sin(e.phi_deg * radians_per_degree);
   const auto turned = [&](const Vec3& v) {
     return Vec3{(v[0] * c + v[1] * s) / e.semi_axes[0], (v[1] * c - v[0] * s) / e.semi_axes[1],
                 v[2] / e.semi_axes[2]};
@@ -84,7 +82,7 @@ double chord_of_line(const Ellipsoid& e, const Vec3& point, const Vec3& directio
 }
 
 bool contains(const Ellipsoid& e, const Vec3& p) {
-  const double c = std::cos(radians(e.phi_deg)), s = std::sin(radians(e.phi_deg));
+  const double c = std::cos(e.phi_deg * radians_per_degree), s = std::sin(e.phi_deg * radians_per_degree);
   const double x = p[0] - e.center[0], y = p[1] - e.center[1];
   const double a = (x * c + y * s) / e.semi_axes[0], b = (y * c - x * s) / e.semi_axes[1];
   const double h = (p[2] - e.center[2]) / e.semi_axes[2];

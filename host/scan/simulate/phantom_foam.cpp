@@ -12,7 +12,7 @@ namespace vdvr {
 namespace {
 
 // Of the body's radius: pores' radii, and what lies between two at least.
-constexpr double smallest = 0.02, largest = 0.1, gap = 0.01;
+constexpr double smallest = 0.02, largest_radius = 0.1, gap = 0.01;
 // Places tried for a pore before the next, which may be smaller.
 constexpr int tries = 2000;
 
@@ -39,7 +39,7 @@ Phantom foam(double radius, double half_height, int pores, std::uint64_t seed) {
     if (tried == tries)
       throw InputError(
           fmt::format("pores: room for {} of {} was found; ask for fewer", placed.size(), pores));
-    const double r = radius * smallest * std::pow(largest / smallest, uniform(random));
+    const double r = radius * smallest * std::pow(largest_radius / smallest, uniform(random));
     const double x = (2 * uniform(random) - 1) * radius, y = (2 * uniform(random) - 1) * radius,
                  z = (2 * uniform(random) - 1) * std::max(0.0, half_height - r);
     if (!fits({x, y, z}, r)) continue;

@@ -19,7 +19,7 @@
 namespace vdvr {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 constexpr double alpha = 0.25, frequency = 6;    // the paper's a and f_M
 constexpr double scale = 1 / (2 * (1 + alpha));  // puts f into [0, 1]
 constexpr double longest_panel = 0.5;            // see the head of this file: longer ones need more nodes

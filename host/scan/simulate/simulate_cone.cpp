@@ -5,8 +5,8 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
+#include "host/base/system/casts.hpp"
 #include "host/scan/simulate/simulate_band_limit.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/output_file.hpp"
@@ -15,21 +15,19 @@
 namespace vdvr {
 namespace {
 
-double radians(double degrees) { return degrees * (std::numbers::pi / 180); }
-
 // The view at k * arc / angles; pixels are the detector's own.
 CircularView circular_view_of(const SimulateOptions& o, int k) {
   const ConeSetup& cone = *o.cone;
   CircularView view;
-  view.theta_rad = cone.sense * radians(k * o.arc_deg / o.angles);
+  view.theta_rad = cone.sense * (k * o.arc_deg / o.angles * radians_per_degree);
   view.source_to_axis = cone.source_to_axis;
   view.source_to_detector = cone.source_to_detector;
   view.pitch_u = o.pitch_u;
   view.pitch_v = o.pitch_v;
   view.center = 0.5 * static_cast<double>(o.columns - 1) - cone.detector_offset;
   view.row = 0.5 * static_cast<double>(o.rows - 1);
-  view.in_plane_rad = radians(cone.in_plane_deg);
-  view.out_of_plane_rad = radians(cone.out_of_plane_deg);
+  view.in_plane_rad = cone.in_plane_deg * radians_per_degree;
+  view.out_of_plane_rad = cone.out_of_plane_deg * radians_per_degree;
   return view;
 }
 

@@ -9,7 +9,7 @@
 namespace vdvr {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 constexpr std::int64_t nodes_per_column = 16;
 
 std::int64_t length_for(std::int64_t columns) {

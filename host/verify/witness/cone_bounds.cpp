@@ -13,8 +13,7 @@
 namespace vdvr {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-constexpr double u = 0x1p-24;  // rounding unit of fp32
+using std::numbers::pi;
 constexpr std::size_t most = 6;
 // All sums here are of terms >= 0, in double precision and of fewer than 2^16 operations one after another
 // (but for views, which are added to it): they round down by less.
@@ -197,18 +196,20 @@ void add_kinds(FieldBounds& b, const NodeSums& S, const ConePath& p) {
   constexpr double weights = 1.4883 * 1.4883;  // sums of magnitudes of the points' weights, both ways
   const double roundings =
                    56 + 10 * p.nodes.cancellation + static_cast<double>(p.nodes.together + p.nodes.calls),
-               node = S.places + S.between + weights * 1.01 * u * roundings * S.value +
+               node = S.places + S.between + weights * 1.01 * half_ulp * roundings * S.value +
                       weights * S.weight * p.host_rounding;
   const LagrangeFilter across = lagrange_filter(p.path.across), along = lagrange_filter(p.path.along);
   const AxisNorms each;
   add_errors(b, {node, {across.norms, across.norms, along.norms}});
   const double row_runs = static_cast<double>((p.path.terms + rows_per_run - 1) / rows_per_run),
-               product = 1.01 * u * (static_cast<double>(rows_per_run + 3) + 1.01 * row_runs * row_runs * u);
+               product = 1.01 * half_ulp *
+                         (static_cast<double>(rows_per_run + 3) + 1.01 * row_runs * row_runs * half_ulp);
   if (p.path.along > 1)
     add_errors(b, {along.norms.value * product * S.value, {across.norms, across.norms, each}});
   // Along z first, then y, then x: what comes later passes on what went wrong before.
   const double L = across.norms.value,
-               passes = p.path.across > 1 ? 1.01 * u * (lagrange_points + 1) * (L * L + L) * S.value : 0,
+               passes =
+                   p.path.across > 1 ? 1.01 * half_ulp * (lagrange_points + 1) * (L * L + L) * S.value : 0,
                between = S.along[0] + L * S.along[1] + L * L * S.along[2];
   add_errors(b, {between + passes, {each, each, each}});
 }
@@ -234,7 +235,7 @@ FieldBounds cone_field_bounds(std::span<const ViewMatrix> views, const SupsByVie
   const double up = rise + static_cast<double>(views.size()) * 0x1p-52;
   FieldBounds b;
   add_kinds(b, nodes, path);
-  b.differences = 40 * u * nodes.value;
+  b.differences = 40 * half_ulp * nodes.value;
   b.correction = corrected ? 1 : 0;
   for (std::size_t j = 0; j < 3; ++j) {
     std::array<int, 3> pure{};

@@ -13,6 +13,7 @@
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
 #include "host/verify/witness/cosine_sums.hpp"
+#include "host/verify/witness/lagrange.hpp"
 #include "shared/verify_cone.h"
 #include "shared/verify_nodes.h"
 #include "vdvr/error.hpp"
@@ -24,15 +25,15 @@ static_assert(sizeof(VdvrVerifyCone) == 36);
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
-constexpr double u = 0x1p-24;                    // rounding unit of fp32
-constexpr std::int64_t tile = VDVR_VERIFY_TILE;  // nodes of its side
+using std::numbers::pi;
+constexpr std::int64_t tile_nodes = VDVR_VERIFY_TILE;  // nodes of its side
 constexpr std::int64_t block = VDVR_VERIFY_CONE_BLOCK;
-constexpr std::int64_t before = cone_points / 2 - 1;  // points that a polynomial takes before the place
-constexpr std::int64_t most_rows = 64;                // summed at a time, so that their lines stay in cache
+constexpr std::int64_t points_before =
+    cone_points / 2 - 1;                // points that a polynomial takes before the place
+constexpr std::int64_t most_rows = 64;  // summed at a time, so that their lines stay in cache
 constexpr std::uint64_t most_numbers = std::uint64_t{16} << 20;  // bytes of a launch
 // Half of a block, in nodes.
-constexpr Vec3 half{0.5 * (tile - 1), 0.5 * (tile - 1), 0.5 * (block - 1)};
+constexpr Vec3 half_block{0.5 * (tile_nodes - 1), 0.5 * (tile_nodes - 1), 0.5 * (block - 1)};
 
 /// As kernels/verify/witness/verify_cone.cl reads it.
 struct ViewNumbers {
@@ -41,7 +42,7 @@ struct ViewNumbers {
 };
 static_assert(sizeof(ViewNumbers) == 64);
 
-std::int64_t up(std::int64_t n, std::int64_t multiple) { return (n + multiple - 1) / multiple * multiple; }
+std::int64_t up_to(std::int64_t n, std::int64_t multiple) { return (n + multiple - 1) / multiple * multiple; }
 
 // At a point, the frequency along an axis of the fastest wave that a view can add, radians for each unit of
 // length.
@@ -104,9 +105,10 @@ VerifyConeNodes::Window VerifyConeNodes::window_of(const Nodes& wanted,
     double largest = 0;
     for (const cl_int2& t : tiles)
       for (int corner = 0; corner < 8; ++corner) {
-        const std::array<double, 3> node{static_cast<double>(t.s[0] + ((corner & 1) != 0 ? tile - 1 : 0)),
-                                         static_cast<double>(t.s[1] + ((corner & 2) != 0 ? tile - 1 : 0)),
-                                         (corner & 4) != 0 ? static_cast<double>(wanted.heights - 1) : 0.0};
+        const std::array<double, 3> node{
+            static_cast<double>(t.s[0] + ((corner & 1) != 0 ? tile_nodes - 1 : 0)),
+            static_cast<double>(t.s[1] + ((corner & 2) != 0 ? tile_nodes - 1 : 0)),
+            (corner & 4) != 0 ? static_cast<double>(wanted.heights - 1) : 0.0};
         Vec3 p{};
         for (std::size_t a = 0; a < 3; ++a) p[a] = wanted.first[a] + node[a] * wanted.spacing[a];
         const Vec3 seen = projected(m, p);
@@ -133,12 +135,12 @@ VerifyConeNodes::Window VerifyConeNodes::window_of(const Nodes& wanted,
   });
   // One place more on either side than the points need: fp32 may take the place beside.
   const auto first = [&](std::size_t a) {
-    return static_cast<std::int64_t>(std::floor((low[a] + 0.5) * density)) - before - 1;
+    return static_cast<std::int64_t>(std::floor((low[a] + 0.5) * density)) - points_before - 1;
   };
   const auto end = [&](std::size_t a) {
-    return static_cast<std::int64_t>(std::floor((high[a] + 0.5) * density)) + cone_points - before + 1;
+    return static_cast<std::int64_t>(std::floor((high[a] + 0.5) * density)) + cone_points - points_before + 1;
   };
-  return {first(0), end(0) - first(0), first(1), up(end(1) - first(1), cosine_sums::lanes), magnitude};
+  return {first(0), end(0) - first(0), first(1), up_to(end(1) - first(1), cosine_sums::lanes), magnitude};
 }
 
 /// Some views at the places of a window, on the host and on the device: [view][column][row].
@@ -205,7 +207,7 @@ void VerifyConeNodes::fill(Table& table, std::int64_t first_view) const {
 ConeNodeFacts VerifyConeNodes::make(const Nodes& wanted, const opencl::DeviceArray<float>& nodes) {
   const std::int64_t K = field_.geometry().views();
   ConeNodeFacts facts;
-  const double side_x = tile * wanted.spacing[0], side_y = tile * wanted.spacing[1];
+  const double side_x = tile_nodes * wanted.spacing[0], side_y = tile_nodes * wanted.spacing[1];
   std::vector<cl_int2> tiles;
   for (const auto& t : wanted.tiles) {
     const double x = wanted.first[0] + static_cast<double>(t[0]) * wanted.spacing[0] + 0.5 * side_x,
@@ -252,12 +254,12 @@ Place place_of(const ViewMatrix& m, std::size_t axis, const Vec3& seen, const Ve
   for (std::size_t e = 0; e < 3; ++e) {
     const double step = (m[axis][e] - seen[axis] * m[2][e]) * spacing[e] * cone_density;
     out.numbers.s[e] = static_cast<float>(step);
-    reach += std::abs(step) * half[e] / lambda_min;
+    reach += std::abs(step) * half_block[e] / lambda_min;
   }
   const double middle = (seen[axis] + 0.5) * cone_density, whole = std::floor(middle - reach) - 1;
   out.numbers.s[3] = static_cast<float>(middle - whole);
   out.whole = to_int(static_cast<std::int64_t>(whole) - first);
-  out.error = 1.01 * u * (reach * (14 + 5 * cancellation) + 4);
+  out.error = 1.01 * half_ulp * (reach * (14 + 5 * cancellation) + 4);
   return out;
 }
 
@@ -283,9 +285,9 @@ void VerifyConeNodes::back_project(const Nodes& wanted, const std::vector<cl_int
       for (std::int64_t b = 0; b < blocks; ++b)
         for (std::int64_t k = 0; k < table.filled; ++k) {
           const ViewMatrix& m = field_.views()[at(table.first_view + k)];
-          const std::array<double, 3> middle{static_cast<double>(tiles[at(first + t)].s[0]) + half[0],
-                                             static_cast<double>(tiles[at(first + t)].s[1]) + half[1],
-                                             static_cast<double>(b * block) + half[2]};
+          const std::array<double, 3> middle{static_cast<double>(tiles[at(first + t)].s[0]) + half_block[0],
+                                             static_cast<double>(tiles[at(first + t)].s[1]) + half_block[1],
+                                             static_cast<double>(b * block) + half_block[2]};
           Vec3 p{};
           for (std::size_t a = 0; a < 3; ++a) p[a] = wanted.first[a] + middle[a] * wanted.spacing[a];
           const Vec3 seen = projected(m, p);
@@ -293,7 +295,7 @@ void VerifyConeNodes::back_project(const Nodes& wanted, const std::vector<cl_int
           ViewNumbers& out = numbers[at((t * blocks + b) * table.filled + k)];
           for (std::size_t e = 0; e < 3; ++e) {
             out.lambda.s[e] = static_cast<float>(m[2][e] * wanted.spacing[e]);
-            growth += std::abs(m[2][e]) * wanted.spacing[e] * half[e];
+            growth += std::abs(m[2][e]) * wanted.spacing[e] * half_block[e];
           }
           out.lambda.s[3] = static_cast<float>(seen[2]);
           const double least = seen[2] - growth, cancellation = (seen[2] + growth) / least;
@@ -324,9 +326,9 @@ void VerifyConeNodes::back_project(const Nodes& wanted, const std::vector<cl_int
                                .blocks = to_int(blocks),
                                .nx = to_int(wanted.nx),
                                .all_heights = to_int(wanted.heights)};
-    const std::int64_t groups = up(wanted.used, VDVR_VERIFY_CONE_HEIGHTS) / lanes;
-    kernel(opencl::in_groups(state_.info, {count(groups), count(tile), count(n)},
-                             {count(std::min<std::int64_t>(groups, 8)), count(tile), 1}),
+    const std::int64_t groups = up_to(wanted.used, VDVR_VERIFY_CONE_HEIGHTS) / lanes;
+    kernel(opencl::in_groups(state_.info, {count(groups), count(tile_nodes), count(n)},
+                             {count(std::min<std::int64_t>(groups, 8)), count(tile_nodes), 1}),
            nodes.buffer(), table.device.buffer(), on_device.buffer(), device_tiles.buffer(), shape);
     opencl::finish(state_, "nodes of the field to verify against");  // before the numbers go
   }

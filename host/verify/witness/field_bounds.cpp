@@ -15,8 +15,7 @@ namespace {
 
 using namespace cosine_sums;
 
-constexpr double pi = std::numbers::pi;
-constexpr double u = 0x1p-24;            // rounding unit of fp32
+using std::numbers::pi;
 constexpr std::int64_t sup_density = 3;  // points per pixel where sups are sampled
 
 }  // namespace
@@ -83,13 +82,15 @@ std::vector<KindOfError> error_kinds(const Sums& S, double host_rounding, const 
   const double columns = static_cast<double>(fine_columns * (g.columns + 2)),
                runs = static_cast<double>((g.views() + views_per_run - 1) / views_per_run),
                row_runs = static_cast<double>((path.terms + rows_per_run - 1) / rows_per_run);
-  const double column = (u * (4 * path.reach + 6) + 0x1p-48 * columns) * d * slope +
+  const double column = (half_ulp * (4 * path.reach + 6) + 0x1p-48 * columns) * d * slope +
                         3.515625 / 720 * std::pow(d, 6) * S.sixth_u;
-  const double row =
-      u * (28 + 1.01 * (static_cast<double>(views_per_run + 1 + path.calls) + 1.01 * runs * runs * u)) *
-          S.value +
-      1.4 * host_rounding;
-  const double product = 1.01 * u * (static_cast<double>(rows_per_run + 3) + 1.01 * row_runs * row_runs * u);
+  const double row = half_ulp *
+                         (28 + 1.01 * (static_cast<double>(views_per_run + 1 + path.calls) +
+                                       1.01 * runs * runs * half_ulp)) *
+                         S.value +
+                     1.4 * host_rounding;
+  const double product =
+      1.01 * half_ulp * (static_cast<double>(rows_per_run + 3) + 1.01 * row_runs * row_runs * half_ulp);
 
   const LagrangeFilter filter = lagrange_filter(path.across), along = lagrange_filter(path.along);
   const AxisNorms across = filter.norms, each, band = band_norms(pi * h[2] / g.pitch_v);
@@ -109,7 +110,7 @@ std::vector<KindOfError> error_kinds(const Sums& S, double host_rounding, const 
     if (made) interpolation *= 1 + lagrange_error(path.band[a]);
   }
   const double L = filter.norms.value,
-               passes = path.across > 1 ? 1.01 * u * (lagrange_points + 1) * (L * L + L) * S.value : 0;
+               passes = path.across > 1 ? 1.01 * half_ulp * (lagrange_points + 1) * (L * L + L) * S.value : 0;
   kinds.push_back({(interpolation - 1) * S.value + passes, {each, each, each}});
   return kinds;
 }
@@ -161,7 +162,7 @@ FieldBounds field_bounds(const SupsByView& sups, double host_rounding, const Par
     S.sixth_u += derivative(k, 6, 0);
   }
   for (const KindOfError& kind : error_kinds(S, host_rounding, g, h, path)) add_errors(b, kind);
-  b.differences = 40 * u * S.value;
+  b.differences = 40 * half_ulp * S.value;
   double plain = 0;
   for (std::size_t j = 0; j < 3; ++j) {
     std::array<int, 3> six{};

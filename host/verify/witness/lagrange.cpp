@@ -12,7 +12,7 @@
 namespace vdvr {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 constexpr int first_node = 1 - lagrange_points / 2;  // from the node on the left of the place
 
 double lagrange_weight(double at, int i) {

@@ -9,6 +9,7 @@
 namespace vdvr {
 
 /// Nodes of an interpolant; the place lies between the sixth and the seventh.
+inline constexpr double half_ulp = 0x1p-24;  ///< rounding unit of fp32
 constexpr int lagrange_points = 12;
 
 /// By how much what is formed along an axis exceeds errors of size 1: a value, the five-point formula for the

@@ -21,8 +21,8 @@ static_assert(VDVR_VERIFY_VIEWS == views_per_run && VDVR_VERIFY_ROWS == rows_per
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
-constexpr std::int64_t lanes = 16;               // of a vector along z
+using std::numbers::pi;
+constexpr std::int64_t row_lanes = 16;           // of a vector along z
 constexpr std::int64_t tile = VDVR_VERIFY_TILE;  // nodes of its side
 constexpr std::int64_t room = 64;                // floats after a buffer's end that vectors may touch
 constexpr std::int64_t before = 5;               // nodes that a polynomial takes before the place
@@ -63,20 +63,20 @@ VerifyNodes::VerifyNodes(opencl::State& state, const ExactField& field, const Co
 
 std::uint64_t VerifyNodes::bytes_of(const Part& part) const {
   return 4 * count(tiles_across(part.nx) * tile * tiles_across(part.ny) * tile) *
-         count(up(rows_of(part, field_.geometry().rows), lanes));
+         count(up(rows_of(part, field_.geometry().rows), row_lanes));
 }
 
 std::int64_t VerifyNodes::views_at_once() const {
   const auto budget =
       static_cast<std::int64_t>(std::min(state_.memory.left() / 8, state_.info.max_allocation));
-  return std::clamp<std::int64_t>(budget / (4 * columns_ * lanes), 1, field_.geometry().views());
+  return std::clamp<std::int64_t>(budget / (4 * columns_ * row_lanes), 1, field_.geometry().views());
 }
 
 /// 16 rows of the fine columns of some views, on the host and on the device.
 struct VerifyNodes::Table {
   Table(opencl::State& of, std::int64_t columns, std::int64_t at_once)
       : state(of),
-        per_view(columns * lanes),
+        per_view(columns * row_lanes),
         views(at_once),
         counted(of, bytes(), "fine columns of the filtered projections") {
     host.resize(at(views * per_view));
@@ -101,32 +101,33 @@ void VerifyNodes::fill(Table& table, std::int64_t first_row, std::int64_t first_
   const std::int64_t U = g.columns, V = g.rows, last = fine_columns * U;
   table.first_view = first_view;
   table.filled = std::min(table.views, g.views() - first_view);
-  std::vector<double> basis(at(V * lanes));
-  for (std::int64_t r = 0; r < lanes; ++r) {
+  std::vector<double> basis(at(V * row_lanes));
+  for (std::int64_t r = 0; r < row_lanes; ++r) {
     // Places beyond the last are computed like it: what is never read is finite at least.
     const auto row = static_cast<double>(std::min(first_row + r, rows_of(part_, V) - 1));
     const double z = grid_.origin[2] + (static_cast<double>(part_.first_z) + row) /
                                            static_cast<double>(part_.along) * grid_.spacing[2];
     const double half = part_.rows ? row + 0.5 : z / g.pitch_v + 0.5 * static_cast<double>(V);
     for (std::int64_t l = 0; l < V; ++l)
-      basis[at(l * lanes + r)] = std::cos(pi * static_cast<double>(l) * half / static_cast<double>(V));
+      basis[at(l * row_lanes + r)] = std::cos(pi * static_cast<double>(l) * half / static_cast<double>(V));
   }
   const auto cosine = cosine_sums::cosine_period(last);
   parallel_for(table.filled, {}, "", [&](std::int64_t k) {
-    std::vector<double> line(at(U * lanes));
-    cosine_sums::sum_rows(field_.coefficients().data() + (first_view + k) * U * V, U, V, basis, lanes, line);
+    std::vector<double> line(at(U * row_lanes));
+    cosine_sums::sum_rows(field_.coefficients().data() + (first_view + k) * U * V, U, V, basis, row_lanes,
+                          line);
     float* out = table.host.data() + k * table.per_view;
     cosine_sums::sum_columns(
-        line, U, lanes, fine_columns, cosine,
+        line, U, row_lanes, fine_columns, cosine,
         [&](std::int64_t n, std::int64_t r, const std::array<double, cosine_sums::lanes>& values) {
           for (std::int64_t i = 0; i < cosine_sums::lanes; ++i)
-            out[(n + pad_) * lanes + r + i] = static_cast<float>(values[at(i)] / unit_);
+            out[(n + pad_) * row_lanes + r + i] = static_cast<float>(values[at(i)] / unit_);
         });
     // Beyond the detector's edges the series is its own mirror image.
     for (std::int64_t n = 0; n < columns_; ++n) {
       std::int64_t m = std::abs(n - pad_) % (2 * last);
       if (m > last) m = 2 * last - m;
-      if (m != n - pad_) std::copy_n(out + (m + pad_) * lanes, lanes, out + n * lanes);
+      if (m != n - pad_) std::copy_n(out + (m + pad_) * row_lanes, row_lanes, out + n * row_lanes);
     }
   });
   table.device.write(std::span<const float>(table.host).first(at(table.filled * table.per_view)));
@@ -140,7 +141,7 @@ void VerifyNodes::make(const Part& part) {
   steps_.reset();
   tile_columns_ = tiles_across(part.nx);
   const std::int64_t rows = rows_of(part, g.rows);
-  rows_padded_ = up(rows, lanes);
+  rows_padded_ = up(rows, row_lanes);
   nodes_.emplace(state_, bytes_of(part) / 4 + count(room), "nodes of the field to verify against");
   nodes_->fill(0.0f);
   if (cone_) {
@@ -174,7 +175,7 @@ void VerifyNodes::make(const Part& part) {
   tiles_.emplace(state_, std::span<const cl_int2>(tiles), "tiles of nodes");
   steps_.emplace(state_, std::span<const cl_float4>(steps), "view positions");
   Table table(state_, columns_, views_at_once());
-  for (std::int64_t row = 0; row < rows; row += lanes) back_project(table, row);
+  for (std::int64_t row = 0; row < rows; row += row_lanes) back_project(table, row);
 }
 
 void VerifyNodes::make_cone_nodes(const Part& part) {
@@ -196,8 +197,8 @@ void VerifyNodes::back_project(Table& table, std::int64_t first_row) {
   const std::int64_t K = field_.geometry().views();
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrVerifyRows> kernel(
       state_, "verify/witness/verify_nodes", "verify_nodes",
-      opencl::height_defines(state_.info, to_int(lanes)));
-  const std::uint64_t in_row = count(lanes / opencl::lanes_of(state_.info, to_int(lanes)));
+      opencl::height_defines(state_.info, to_int(row_lanes)));
+  const std::uint64_t in_row = count(row_lanes / opencl::lanes_of(state_.info, to_int(row_lanes)));
   for (std::int64_t first = 0; first < K; first += table.views) {
     fill(table, first_row, first);
     const VdvrVerifyRows rows{.accumulate = first > 0 ? 1 : 0,
@@ -227,21 +228,21 @@ VerifyNodes::Heights VerifyNodes::heights_of(const Blocks& blocks) const {
              stride = std::max<std::int64_t>(1, part_.along / blocks.rate);
   const LagrangeFilter filter = lagrange_filter(to_int(factor));
   Heights h;
-  for (std::int64_t first = 0; first < blocks.z_padded; first += lanes) {
+  for (std::int64_t first = 0; first < blocks.z_padded; first += row_lanes) {
     // Of heights: those around the group's. Places beyond the part's are nobody's.
     const auto node_of = [&](std::int64_t i) {
       return floor_of((blocks.first_z + first + i) * stride, factor) - part_.first_z;
     };
     const std::int64_t around = factor > 1 ? before : 0,
                        begin = part_.rows ? 0 : std::clamp<std::int64_t>(node_of(0) - around, 0, all - 1),
-                       end = part_.rows
-                                 ? all
-                                 : std::clamp<std::int64_t>(
-                                       node_of(lanes - 1) + (factor > 1 ? before + 2 : 1), begin + 1, all);
+                       end = part_.rows ? all
+                                        : std::clamp<std::int64_t>(
+                                              node_of(row_lanes - 1) + (factor > 1 ? before + 2 : 1),
+                                              begin + 1, all);
     h.bands.push_back({{to_int(begin), to_int(end - begin),
-                        to_int(static_cast<std::int64_t>(h.weights.size()) / lanes), 0}});
+                        to_int(static_cast<std::int64_t>(h.weights.size()) / row_lanes), 0}});
     for (std::int64_t row = begin; row < end; ++row)
-      for (std::int64_t i = 0; i < lanes; ++i) {
+      for (std::int64_t i = 0; i < row_lanes; ++i) {
         const std::int64_t height = blocks.first_z + first + i;
         if (part_.rows) {
           const double z = grid_.origin[2] +
@@ -266,7 +267,7 @@ std::int64_t VerifyNodes::floats_per_block(int rate, std::int64_t nx, std::int64
 
 void VerifyNodes::gold(const Blocks& b, const opencl::DeviceArray<float>& values) {
   const std::int64_t factor = b.rate / part_.across, n = nodes_before(b.nx, factor),
-                     blocks = static_cast<std::int64_t>(b.first.size()), groups = b.z_padded / lanes;
+                     blocks = static_cast<std::int64_t>(b.first.size()), groups = b.z_padded / row_lanes;
   std::vector<cl_int2> places;
   for (const auto& first : b.first)
     places.push_back({{to_int(floor_of(first[0], factor) - (factor > 1 ? before : 0) - part_.first_x),
@@ -276,8 +277,8 @@ void VerifyNodes::gold(const Blocks& b, const opencl::DeviceArray<float>& values
                                                    "blocks of gold to verify");
   const opencl::DeviceArray<cl_int4> bands(state_, std::span<const cl_int4>(h.bands), "heights to verify");
   const opencl::DeviceArray<float> weights(state_, std::span<const float>(h.weights), "product along z");
-  const opencl::Defines defines = opencl::height_defines(state_.info, to_int(lanes));
-  const std::uint64_t in_group = count(lanes / opencl::lanes_of(state_.info, to_int(lanes)));
+  const opencl::Defines defines = opencl::height_defines(state_.info, to_int(row_lanes));
+  const std::uint64_t in_group = count(row_lanes / opencl::lanes_of(state_.info, to_int(row_lanes)));
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrVerifyHeights> along(
       state_, "verify/witness/verify_nodes", "verify_heights", defines);
   const VdvrVerifyHeights shape{.blocks = to_int(blocks),
@@ -328,7 +329,7 @@ NodePath VerifyNodes::path(const Part& part, int rate) const {
   p.across = rate / part.across;
   p.rows = part.rows;
   p.along = std::max(1, rate / part.along);
-  p.terms = part.rows ? g.rows : lanes + lagrange_points;
+  p.terms = part.rows ? g.rows : row_lanes + lagrange_points;
   p.gain = part.rows ? gain_ : 1;
   if (cone_) return p;
   p.calls = (g.views() + views_at_once() - 1) / views_at_once();

@@ -10,12 +10,12 @@ namespace vdvr {
 namespace {
 
 // Samples of a cell in half steps, the first of them 0.
-using Samples = std::array<int, 8>;
+using HalfSteps = std::array<int, 8>;
 
 int half_steps(std::size_t steps, std::size_t axis) { return (steps >> axis & 1U) != 0 ? 2 : 1; }
 
 // Whether edges along which samples differ by the whole step join all corners.
-bool is_joined(const Samples& s, std::size_t steps) {
+bool is_joined(const HalfSteps& s, std::size_t steps) {
   std::array<bool, 8> reached{true};
   for (int round = 0; round < 7; ++round)
     for (std::size_t c = 0; c < 8; ++c)
@@ -28,7 +28,7 @@ bool is_joined(const Samples& s, std::size_t steps) {
 
 // The sum of errors times samples is linear in the samples. So it is largest at a vertex of what they may be,
 // where edges of whole steps join all corners.
-void add_vertices(std::size_t steps, Samples& s, std::size_t corner, std::vector<Samples>& out) {
+void add_vertices(std::size_t steps, HalfSteps& s, std::size_t corner, std::vector<HalfSteps>& out) {
   if (corner == 8) {
     if (is_joined(s, steps)) out.push_back(s);
     return;
@@ -43,10 +43,10 @@ void add_vertices(std::size_t steps, Samples& s, std::size_t corner, std::vector
   for (s[corner] = from; s[corner] <= to; ++s[corner]) add_vertices(steps, s, corner + 1, out);
 }
 
-std::array<std::vector<Samples>, 8> all_vertices() {
-  std::array<std::vector<Samples>, 8> all;
+std::array<std::vector<HalfSteps>, 8> all_vertices() {
+  std::array<std::vector<HalfSteps>, 8> all;
   for (std::size_t steps = 1; steps < 8; ++steps) {
-    Samples s{};
+    HalfSteps s{};
     add_vertices(steps, s, 1, all[steps]);
   }
   return all;
@@ -70,14 +70,14 @@ double sum_of_steps(std::size_t steps) {
 }
 
 void raise_to_error(BySteps& largest, const Corners& off) {
-  static const std::array<std::vector<Samples>, 8> vertices = all_vertices();
+  static const std::array<std::vector<HalfSteps>, 8> vertices = all_vertices();
   double moved = 0;
   for (const double d : off) moved += 0.5 * std::abs(d);
   for (std::size_t steps = 1; steps < 8; ++steps) {
     // No two samples of the cell differ by more than the sum of the steps.
     if (moved * sum_of_steps(steps) <= largest[steps]) continue;
     if (!std::isfinite(moved)) largest[steps] = std::numeric_limits<double>::infinity();
-    for (const Samples& s : vertices[steps]) {
+    for (const HalfSteps& s : vertices[steps]) {
       double error = 0;
       for (std::size_t c = 0; c < 8; ++c) error += off[c] * 0.5 * s[c];
       largest[steps] = std::max(largest[steps], error);

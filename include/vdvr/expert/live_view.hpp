@@ -52,6 +52,8 @@ struct LiveView {
   std::optional<std::array<double, 6>> clip;
   bool shading = true;
   bool bound = false;  ///< mixes the colours of the bound of |V - F| into the picture
+
+  [[nodiscard]] bool is_flat() const { return mode == RenderMode::slice || mode == RenderMode::error; }
 };
 /// What automatic_view shows; thin volumes as a slice. A picture that is higher than wide is zoomed out until
 /// the volume fits its width.

@@ -22,6 +22,7 @@ namespace vdvr {
 
 /// Levels per axis in file order: z, y, x.
 using LevelTriple = std::array<std::uint8_t, 3>;
+inline constexpr LevelTriple level_of_base{0, 0, 0};
 
 enum class SampleType : std::uint8_t { f32, u16, u8 };  // the order of kernels/shared/mixed_sampler.h
 /// "f32", "u16", "u8".
