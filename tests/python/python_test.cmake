@@ -6,7 +6,7 @@ if(WHAT STREQUAL "wheel")
   include("${CMAKE_CURRENT_LIST_DIR}/../support/python_packages.cmake")
   file(REMOVE "${installed}")
   # What the tests use beside the wheel.
-  find_python_with(${TEST} 900 numpy h5py pillow scikit-image jupyter_rfb npe2 xarray pyvista)
+  find_python_with(${TEST} 900 numpy h5py pillow scikit-image jupyter_rfb npe2 xarray pyvista nbclient ipykernel astra-toolbox)
   if(NOT python)
     return()
   endif()
