@@ -89,6 +89,9 @@ struct ComponentsOptions;
 struct ComponentTable;
 struct LineOptions;
 struct LineMeasure;
+struct MeanOfScan;
+struct MeanNoise;
+struct ProjectionSet;
 
 class VDVR_API Measurement {
  public:
@@ -105,6 +108,11 @@ class VDVR_API Measurement {
   [[nodiscard]] VolumeMeasure volume(const ValueRange& range, const MeasureOptions& options = {},
                                      const Progress& progress = {}) const;
   [[nodiscard]] MeanMeasure mean(const Progress& progress = {}) const;
+  /// F's own mean over the region, and what noise leaves in it, by the projections that the volume was built
+  /// of (mean_of_scan.hpp).
+  [[nodiscard]] MeanOfScan mean_of_scan(const ProjectionSet& scan, const MeanNoise& noise,
+                                        std::uint64_t max_memory_bytes = 0,
+                                        const Progress& progress = {}) const;
   [[nodiscard]] ExtremesMeasure extremes(const Progress& progress = {}) const;
   /// `edges` ascend; throws InputError where they do not, or are fewer than two.
   [[nodiscard]] Distribution distribution(const std::vector<double>& edges,
