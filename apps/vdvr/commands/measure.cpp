@@ -8,6 +8,7 @@
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/inputs.hpp"
+#include "apps/vdvr/measure_scan.hpp"
 #include "apps/vdvr/measure_tables.hpp"
 #include "apps/vdvr/output.hpp"
 #include "vdvr/error.hpp"
@@ -42,6 +43,12 @@ void declare(Arguments& args) {
       .value("cylinder", "X,Y,Z0,Z1,R", "in an upright cylinder about x, y, from z0 to z1")
       .value("ball", "X,Y,Z,R", "in a ball")
       .value("mask", "VOLUME", "where the nearest sample of a uniform volume is not 0");
+  args.group("The projections themselves")
+      .value("projections", "SCAN",
+             "with --mean: F's own mean by the projections that FILE was built from, and its sigma: what "
+             "their noise leaves in it");
+  add_scan(args);
+  add_noise(args);
   add_volume_input(args);
   add_common(args);
 }
@@ -79,6 +86,8 @@ Asked asked_of(const Arguments& args) {
   if (asked.along) refuse(args, {"between"}, "has two values; a line takes --above or --below");
   if (asked.along) refuse(args, {"cylinder", "ball", "mask"}, "is not for --along, which --roi alone cuts");
   if (!asked.histogram) refuse(args, {"range"}, "is for --histogram");
+  if (!args.has("mean")) refuse(args, {"projections"}, "is for --mean");
+  if (!args.has("projections")) refuse(args, {"photons", "sigma-p"}, "is for --projections");
   const int tables = int{asked.along} + int{asked.components} + int{asked.histogram};
   if (args.has("output") && tables != 1)
     throw InputError(
@@ -168,8 +177,22 @@ class Report {
     json["mean"] = interval_json(v.mean);
     json["mass"] = interval_json(v.integral);
     json["mean_bound"] = v.bound;
+    json["field_mean"] = nullptr;
+    json["sigma"] = nullptr;
     if (args_.has("mean")) line("mean", interval_text(v.mean, "") + ", over " + region_text_);
+    if (args_.has("projections")) mean_of_scan(v);
+    else if (args_.has("mean")) line("sigma", "not known: the sigma of a mean needs --projections");
     if (args_.has("mass")) line("mass", interval_text(v.integral, "density x " + cubed()));
+  }
+  void mean_of_scan(const MeanMeasure& v) {
+    const ScanOfFile scan = scan_of_file(args_, file_.certificate, progress_);
+    const MeanOfScan own = m_.mean_of_scan(scan.projections, {scan.noise, scan.flats},
+                                           common_options(args_).max_memory, progress_);
+    json["field_mean"] = own.mean;
+    json["sigma"] = own.sigma ? Json(*own.sigma) : Json();
+    json["sigma_of_flats"] = own.sigma ? Json(own.of_flats) : Json();
+    json["sigma_source"] = scan.source;
+    for (const std::string& text : mean_of_scan_lines(own, v, scan.source)) lines.push_back(text);
   }
   void extremes() {
     const ExtremesMeasure v = m_.extremes(progress_);
