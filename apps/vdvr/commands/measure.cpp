@@ -8,6 +8,7 @@
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/inputs.hpp"
+#include "apps/vdvr/measure_picture.hpp"
 #include "apps/vdvr/measure_scan.hpp"
 #include "apps/vdvr/measure_tables.hpp"
 #include "apps/vdvr/output.hpp"
@@ -49,6 +50,7 @@ void declare(Arguments& args) {
              "their noise leaves in it");
   add_scan(args);
   add_noise(args);
+  add_measure_picture(args);
   add_volume_input(args);
   add_common(args);
 }
@@ -88,6 +90,7 @@ Asked asked_of(const Arguments& args) {
   if (!asked.histogram) refuse(args, {"range"}, "is for --histogram");
   if (!args.has("mean")) refuse(args, {"projections"}, "is for --mean");
   if (!args.has("projections")) refuse(args, {"photons", "sigma-p"}, "is for --projections");
+  check_measure_picture(args, asked.has_range() && !asked.along, asked.histogram);
   const int tables = int{asked.along} + int{asked.components} + int{asked.histogram};
   if (args.has("output") && tables != 1)
     throw InputError(
@@ -147,7 +150,9 @@ class Report {
     if (asked_.histogram) histogram();
     if (asked_.along) along();
     if (asked_.components) components();
+    if (args_.has("picture") && !asked_.histogram) slice();
   }
+  std::optional<Image> picture;
   Json json = Json::object();
   std::vector<std::string> lines;
   std::string csv;
@@ -223,8 +228,19 @@ class Report {
     set_region(d.region);
     json["histogram"] = distribution_json(d);
     csv = distribution_csv(d);
+    if (args_.has("picture")) {
+      const MeasurePictureOptions o = measure_picture_options(args_, file_.volume.grid);
+      picture = histogram_picture(d, o.width, o.height);
+    }
     line("histogram",
          fmt::format("{} bins from {:.6g} to {:.6g}, of {}", bins, range.lo, range.hi, region_text_));
+  }
+  void slice() {
+    const MeasurePictureOptions o = measure_picture_options(args_, file_.volume.grid);
+    ComponentsOptions of_components;
+    of_components.max_memory_bytes = common_options(args_).max_memory / 2;
+    picture = asked_.components ? component_slice(m_, asked_.range, o, of_components, progress_)
+                                : class_slice(m_, asked_.range, o);
   }
   void along() {
     const auto [p, q] = points_of(args_, "along");
@@ -276,6 +292,8 @@ int measure_command(Arguments& args) {
   if (!args.has("mask")) refuse(args, {"nan-as"}, "is for --mask");
   const fs::path output = args.text_or("output", "");
   if (!output.empty()) check_output(output, common.force, {path});
+  const fs::path picture = args.text_or("picture", "");
+  if (!picture.empty()) check_output(picture, common.force, {path, output});
   if (kind_of(path, args) != InputKind::certified)
     throw InputError(fmt::format("{}: is not a certified volume; build it first", path.string()));
 
@@ -287,6 +305,7 @@ int measure_command(Arguments& args) {
   report.run();
   throw_if_stopped();
   if (!output.empty()) io::write_file(output, report.csv);
+  if (report.picture) write_png(picture, *report.picture);
   progress.clear();
 
   Json json = {{"file", path.string()},
@@ -297,10 +316,12 @@ int measure_command(Arguments& args) {
   if (asked.range.largest) json["at_most"] = *asked.range.largest;
   json.update(report.json);
   if (!output.empty()) json["output"] = output.string();
+  if (!picture.empty()) json["picture"] = picture.string();
   json["seconds"] = seconds_json(progress.seconds());
   print_result(common, json, [&] {
     for (const std::string& line : report.lines) fmt::print("{}\n", line);
-    if (!output.empty()) fmt::print("written        {}\n", output.string());
+    for (const fs::path& written : {output, picture})
+      if (!written.empty()) fmt::print("written        {}\n", written.string());
   });
   return 0;
 }

@@ -124,6 +124,9 @@ class VDVR_API Measurement {
   /// regions do not cut it. Throws InputError for points that are not finite or one and the same.
   [[nodiscard]] LineMeasure along(const Vec3& p, const Vec3& q, const LineOptions& options) const;
 
+  /// For the library's own use.
+  [[nodiscard]] const measured::Field& field() const { return *field_; }
+
  private:
   std::unique_ptr<const measured::Field> field_;
 };
