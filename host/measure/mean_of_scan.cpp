@@ -1,5 +1,5 @@
 // Views in groups, each with sums of its own, which are added in their order: sums do not depend on threads.
-#include "host/measure/mean_of_scan.hpp"
+#include "vdvr/expert/mean_of_scan.hpp"
 
 #include <algorithm>
 #include <array>

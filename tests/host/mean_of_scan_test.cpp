@@ -10,7 +10,6 @@
 
 #include "host/base/system/casts.hpp"
 #include "host/field/fdk/filter_cone.hpp"
-#include "host/measure/mean_of_scan.hpp"
 #include "host/measure/mean_weights.hpp"
 #include "tests/support/cone_scans.hpp"
 #include "tests/support/repeated_scans.hpp"

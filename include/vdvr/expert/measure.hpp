@@ -109,7 +109,7 @@ class VDVR_API Measurement {
                                      const Progress& progress = {}) const;
   [[nodiscard]] MeanMeasure mean(const Progress& progress = {}) const;
   /// F's own mean over the region, and what noise leaves in it, by the projections that the volume was built
-  /// of (mean_of_scan.hpp).
+  /// of (mean_of_scan.hpp). Throws MismatchError as check_input(), ResourceError.
   [[nodiscard]] MeanOfScan mean_of_scan(const ProjectionSet& scan, const MeanNoise& noise,
                                         std::uint64_t max_memory_bytes = 0,
                                         const Progress& progress = {}) const;
