@@ -12,7 +12,7 @@ void add_measure_picture(Arguments& args) {
              "a slice: what is surely, possibly and surely not in the range; with --components each in a "
              "colour of its own; of --histogram its band")
       .value("slice-axis", "x|y|z", "default z")
-      .value("slice-position", "P", "world (default: the middle)")
+      .value("slice-position", "P", "world (default: the middle of what is measured)")
       .value("size", "512x512", "pixels, at most");
 }
 
@@ -29,12 +29,10 @@ void check_measure_picture(const Arguments& args, bool of_range, bool of_histogr
   if (of_histogram) refuse(args, {"slice-axis", "slice-position"}, "is not of --histogram");
 }
 
-MeasurePictureOptions measure_picture_options(const Arguments& args, const Grid& grid) {
+MeasurePictureOptions measure_picture_options(const Arguments& args) {
   MeasurePictureOptions o;
   o.axis = args.choice("slice-axis", "z")[0] - 'x';
-  const auto a = static_cast<std::size_t>(o.axis);
-  o.position = args.number("slice-position")
-                   .value_or(grid.origin[a] + 0.5 * static_cast<double>(grid.cells[a]) * grid.spacing[a]);
+  o.position = args.number("slice-position");
   if (const auto size = args.sizes("size", 2)) {
     o.width = (*size)[0];
     o.height = (*size)[1];

@@ -229,14 +229,14 @@ class Report {
     json["histogram"] = distribution_json(d);
     csv = distribution_csv(d);
     if (args_.has("picture")) {
-      const MeasurePictureOptions o = measure_picture_options(args_, file_.volume.grid);
+      const MeasurePictureOptions o = measure_picture_options(args_);
       picture = histogram_picture(d, o.width, o.height);
     }
     line("histogram",
          fmt::format("{} bins from {:.6g} to {:.6g}, of {}", bins, range.lo, range.hi, region_text_));
   }
   void slice() {
-    const MeasurePictureOptions o = measure_picture_options(args_, file_.volume.grid);
+    const MeasurePictureOptions o = measure_picture_options(args_);
     ComponentsOptions of_components;
     of_components.max_memory_bytes = common_options(args_).max_memory / 2;
     picture = asked_.components ? component_slice(m_, asked_.range, o, of_components, progress_)

@@ -47,21 +47,28 @@ void require_size(std::int64_t width, std::int64_t height) {
         fmt::format("a picture of {}x{} pixels: give {} to {} of each", width, height, least, most));
 }
 
-Pixels pixels_of(const Grid& g, const MeasurePictureOptions& o) {
+Pixels pixels_of(const MeasuredRegion& region, const MeasurePictureOptions& o) {
   require_size(o.width, o.height);
   Pixels p;
   if (o.axis != 2) p = o.axis == 1 ? Pixels{0, 2, 1} : Pixels{1, 2, 0};
-  const auto length = [&](std::size_t a) { return static_cast<double>(g.cells[a]) * g.spacing[a]; };
-  const double low = g.origin[p.normal], high = low + length(p.normal);
-  if (!(o.position >= low && o.position <= high))
-    throw InputError(fmt::format("the slice at {} misses the volume, which reaches from {:.6g} to {:.6g}",
-                                 o.position, low, high));
+  Vec3 low{}, high{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const std::vector<double> faces = region.faces(a);
+    low[a] = faces.front();
+    high[a] = faces.back();
+  }
+  const auto length = [&](std::size_t a) { return high[a] - low[a]; };
+  const double position = o.position.value_or(0.5 * (low[p.normal] + high[p.normal]));
+  if (!(position >= low[p.normal] && position <= high[p.normal]))
+    throw InputError(
+        fmt::format("the slice at {} misses what is measured, which reaches from {:.6g} to {:.6g}", position,
+                    low[p.normal], high[p.normal]));
   p.pixel = std::max(length(p.across) / static_cast<double>(o.width),
                      length(p.down) / static_cast<double>(o.height - kLegend));
   p.width = std::clamp<std::int64_t>(std::llround(length(p.across) / p.pixel), 1, o.width);
   p.height = std::clamp<std::int64_t>(std::llround(length(p.down) / p.pixel), 1, o.height - kLegend);
-  p.origin = g.origin;
-  p.origin[p.normal] = o.position;
+  p.origin = low;
+  p.origin[p.normal] = position;
   return p;
 }
 
@@ -117,9 +124,11 @@ Colour hue_of(std::int64_t number, double light) {
   return c;
 }
 
+// Beside a narrow slice the picture is as wide as its legend, where it may be.
 template <class Look>
-Image slice_of(const Pixels& p, const std::vector<Key>& keys, Look&& look) {
-  Image image = blank(p.width, p.height + kLegend, kPaper);
+Image slice_of(const Pixels& p, std::int64_t most, const std::vector<Key>& keys, Look&& look) {
+  constexpr std::int64_t legend = 420;
+  Image image = blank(std::max(p.width, std::min(most, legend)), p.height + kLegend, kPaper);
   for (std::int64_t y = 0; y < p.height; ++y)
     for (std::int64_t x = 0; x < p.width; ++x) put(image, x, y, look(x, y));
   draw_legend(image, keys);
@@ -132,8 +141,8 @@ Image class_slice(const Measurement& measurement, const ValueRange& range,
                   const MeasurePictureOptions& options) {
   measured::require_range(range);
   const measured::Field& field = measurement.field();
-  const Pixels p = pixels_of(field.volume().grid, options);
-  return slice_of(p,
+  const Pixels p = pixels_of(field.region(), options);
+  return slice_of(p, options.width,
                   {{kSure, kSure, "surely"},
                    {kBetween, kStripe, "possibly"},
                    {kPaper, kPaper, "surely not"},
@@ -157,7 +166,7 @@ Image component_slice(const Measurement& measurement, const ValueRange& range,
                       const MeasurePictureOptions& options, const ComponentsOptions& of_components,
                       const Progress& progress) {
   const measured::Field& field = measurement.field();
-  const Pixels p = pixels_of(field.volume().grid, options);
+  const Pixels p = pixels_of(field.region(), options);
   ComponentsOptions asked = of_components;
   asked.least_volume = std::numeric_limits<double>::max();  // no rows
   asked.points.clear();
@@ -165,10 +174,10 @@ Image component_slice(const Measurement& measurement, const ValueRange& range,
     for (std::int64_t x = 0; x < p.width; ++x) asked.points.push_back(p.point(x, y));
   const ComponentTable table = measurement.components(range, asked, progress);
   const Colour example = hue_of(0, 1), dim = hue_of(0, 0.55), dark = hue_of(0, 0.2);
-  return slice_of(p,
+  return slice_of(p, options.width,
                   {{example, example, "surely"},
                    {dim, dim, "possibly"},
-                   {dark, example, "a place that may hold none"},
+                   {dark, example, "may hold none"},
                    {kBeside, kBeside, "not measured"}},
                   [&](std::int64_t x, std::int64_t y) {
                     const PointClass of_point = class_of(field, range, p.point(x, y));

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "vdvr/api.hpp"
 #include "vdvr/expert/components.hpp"
@@ -13,13 +14,13 @@ namespace vdvr {
 
 struct MeasurePictureOptions {
   int axis = 2;                            ///< across which the slice lies: 0 x, 1 y, 2 z
-  double position = 0;                     ///< world
-  std::int64_t width = 512, height = 512;  ///< at most; of the slice the grid's extent, square pixels
+  std::optional<double> position{};        ///< world; none: through the middle of the region
+  std::int64_t width = 512, height = 512;  ///< at most; of the slice the region's extent, square pixels
 };
 
 /// Points that are surely in the range light, those that may be striped, those that are not dark; grey
 /// beside the region. Below it what colours mean. Cost: a sample a pixel. Throws InputError for a slice that
-/// misses the grid, and a picture of fewer than 64 pixels a side or more than 16384.
+/// misses the region, and a picture of fewer than 64 pixels a side or more than 16384.
 VDVR_API Image class_slice(const Measurement& measurement, const ValueRange& range,
                            const MeasurePictureOptions& options);
 
