@@ -129,6 +129,7 @@ template <class Look>
 Image slice_of(const Pixels& p, std::int64_t most, const std::vector<Key>& keys, Look&& look) {
   constexpr std::int64_t legend = 420;
   Image image = blank(std::max(p.width, std::min(most, legend)), p.height + kLegend, kPaper);
+  fill(image, p.width, 0, image.width - p.width, p.height, kBeside);
   for (std::int64_t y = 0; y < p.height; ++y)
     for (std::int64_t x = 0; x < p.width; ++x) put(image, x, y, look(x, y));
   draw_legend(image, keys);
