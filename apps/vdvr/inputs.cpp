@@ -177,13 +177,15 @@ ScanOptions scan_options(const Arguments& args, const FieldOptions& field) {
 namespace {
 
 ProjectionSet load_as_stated(const fs::path& path, const Arguments& args, const Certificate& certificate,
-                             const FieldOptions& field, const Progress& progress) {
+                             const FieldOptions& field, const Progress& progress,
+                             Understood* understood_there = nullptr) {
   const auto geometry = noted_geometry(certificate);
   const InputStatement stored = noted_input(certificate);
   std::error_code error;
   // Folders say it themselves; no other file is of cone beam.
   const bool bare = fs::is_regular_file(path, error) && path.filename() != "scan.json";
-  Understood understood;
+  Understood own;
+  Understood& understood = understood_there ? *understood_there : own;
   ProjectionSet scan = checked(
       load(path, args, field, geometry && geometry->cone && bare ? std::optional(Beam::cone) : std::nullopt,
            stored, progress, understood),
@@ -197,8 +199,8 @@ ProjectionSet load_as_stated(const fs::path& path, const Arguments& args, const 
 }  // namespace
 
 ProjectionSet load_certified_scan(const fs::path& path, const Arguments& args, const Certificate& certificate,
-                                  const Progress& progress) {
-  return load_as_stated(path, args, certificate, certificate.field, progress);
+                                  const Progress& progress, Understood* understood) {
+  return load_as_stated(path, args, certificate, certificate.field, progress, understood);
 }
 
 ProjectionSet load_scan_to_verify(const fs::path& path, const Arguments& args, const Certificate& certificate,

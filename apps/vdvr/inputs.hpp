@@ -52,7 +52,8 @@ ProjectionSet load_any_scan(const std::filesystem::path& path, const Arguments& 
 /// that the certificate says is of cone beam is read so (--beam). Throws MismatchError where options state
 /// something else.
 ProjectionSet load_certified_scan(const std::filesystem::path& path, const Arguments& args,
-                                  const Certificate& certificate, const Progress& progress);
+                                  const Certificate& certificate, const Progress& progress,
+                                  Understood* understood = nullptr);
 /// The same, whose longer rows are made by verify's own means (rows_to_verify.hpp).
 ProjectionSet load_scan_to_verify(const std::filesystem::path& path, const Arguments& args,
                                   const Certificate& certificate, const Progress& progress);

@@ -447,6 +447,7 @@ std::string report_page(const RunReport& run) {
          "content=\"width=device-width, initial-scale=1\">\n<title>" +
          escaped(run.scan.report.name) + " \xE2\x80\x93 certified volume</title>\n<style>" + kStyle +
          "</style>\n</head>\n<body>\n<main>\n" + head(run) + pictures(run) +
+         (run.measured ? measured_section(*run.measured, run.volume.grid.unit) : "") +
          "<section>\n<h2>The certificate</h2>\n" + promised(run) + not_promised(run) +
          "</section>\n<section>\n<h2>Shares of the tolerance</h2>\n" + bars(run) + terms(run.certificate) +
          verification(run) + "</section>\n" + storage_section(run) + settings(run) + input(run) +

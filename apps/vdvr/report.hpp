@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "apps/common/common_options.hpp"
+#include "apps/vdvr/report_measured.hpp"
 #include "vdvr/expert/certificate.hpp"
 #include "vdvr/expert/error_slice.hpp"
 #include "vdvr/expert/mixed_volume.hpp"
@@ -34,6 +35,7 @@ struct RunReport {
   std::map<std::string, double> build_seconds{};
   std::uint64_t file_bytes = 0;
   std::vector<ReportPicture> pictures{};
+  std::optional<MeasuredByRun> measured{};
   std::vector<std::string> run_words{}, verify_words{};  ///< the commands to make it again, word by word
 };
 

@@ -1,10 +1,12 @@
 #include "vdvr/expert/measure.hpp"
 
+#include "host/measure/mean_weights.hpp"
 #include "host/measure/measure_components.hpp"
 #include "host/measure/measure_distribution.hpp"
 #include "host/measure/measure_line.hpp"
 #include "host/measure/measure_mean.hpp"
 #include "host/measure/measure_volume.hpp"
+#include "vdvr/verify_file.hpp"
 
 namespace vdvr {
 
@@ -22,6 +24,13 @@ VolumeMeasure Measurement::volume(const ValueRange& range, const MeasureOptions&
 
 MeanMeasure Measurement::mean(const Progress& progress) const {
   return measured::measure_mean(*field_, progress);
+}
+
+MeanOfScan Measurement::mean_of_scan(const ProjectionSet& scan, const MeanNoise& noise,
+                                     std::uint64_t max_memory_bytes, const Progress& progress) const {
+  check_input(scan, field_->certificate());
+  return vdvr::mean_of_scan(scan, field_->certificate().field, field_->region(), noise, max_memory_bytes,
+                            progress);
 }
 
 ExtremesMeasure Measurement::extremes(const Progress& progress) const {

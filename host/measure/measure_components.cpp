@@ -211,6 +211,7 @@ class Components {
     }
     row.sure_parts = r.sure_parts;
     ++table_.possible;
+    certain_.push_back(row.certain());
     table_.volume.lo += row.volume.lo;
     table_.volume.hi += row.volume.hi;
     if (row.certain()) ++table_.certain;
@@ -240,6 +241,7 @@ class Components {
     for (const FollowedPoint& p : points_) {
       ComponentOfPoint out;
       out.possible = p.possible.number;
+      out.certain = out.possible && certain_[at(*out.possible)];
       out.sure = p.sure.number;
       out.within = p.surely ? Answer::yes : out.possible ? Answer::maybe : Answer::no;
       table_.points.push_back(out);
@@ -259,6 +261,7 @@ class Components {
   std::vector<SureRecord> sure_records_;
   std::vector<FollowedPoint> points_;
   std::int64_t sure_parts_ = 0;
+  std::vector<bool> certain_;  // by the number of a possible component
   ComponentTable table_;
 };
 

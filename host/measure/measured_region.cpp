@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "host/base/system/casts.hpp"
 #include "vdvr/error.hpp"
@@ -171,6 +172,86 @@ bool MeasuredRegion::holds_point(const Vec3& low, const Vec3& high) const {
   };
   return std::any_of(rounds_.begin(), rounds_.end(),
                      [&](const RoundRegion& r) { return inside(nearest(r)); });
+}
+
+bool MeasuredRegion::is_upright() const {
+  return std::all_of(rounds_.begin(), rounds_.end(), [](const RoundRegion& r) { return r.upright; });
+}
+
+std::vector<double> MeasuredRegion::faces(std::size_t axis) const {
+  double low = low_[axis], high = high_[axis];
+  for (const RoundRegion& r : rounds_)
+    if (!(r.upright && axis == 2)) {
+      low = std::max(low, r.center[axis] - r.radius);
+      high = std::min(high, r.center[axis] + r.radius);
+    }
+  std::vector<double> out{low};
+  if (mask_) {
+    const auto [first, last] = mask_range(axis, low, high);
+    for (std::int64_t i = first + 1; i <= last; ++i)
+      if (const double face = mask_face(axis, i); face > out.back() && face < high) out.push_back(face);
+  }
+  out.push_back(high);
+  return out;
+}
+
+double MeasuredRegion::length_along(const Vec3& p, const Vec3& d) const {
+  double from = -std::numeric_limits<double>::infinity(), to = -from;
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (d[a] == 0) {
+      if (p[a] < low_[a] || p[a] > high_[a]) return 0;
+      continue;
+    }
+    const double s = (low_[a] - p[a]) / d[a], t = (high_[a] - p[a]) / d[a];
+    from = std::max(from, std::min(s, t));
+    to = std::min(to, std::max(s, t));
+  }
+  for (const RoundRegion& r : rounds_) {
+    double dd = 0, pd = 0, pp = 0;
+    for (std::size_t a = 0; a < (r.upright ? 2 : 3); ++a) {
+      dd += d[a] * d[a];
+      pd += (p[a] - r.center[a]) * d[a];
+      pp += (p[a] - r.center[a]) * (p[a] - r.center[a]);
+    }
+    const double rest = r.radius * r.radius - pp;
+    if (dd == 0) {
+      if (rest < 0) return 0;
+      continue;
+    }
+    const double root = pd * pd + dd * rest;
+    if (!(root > 0)) return 0;
+    from = std::max(from, (-pd - std::sqrt(root)) / dd);
+    to = std::min(to, (-pd + std::sqrt(root)) / dd);
+  }
+  if (!(from < to)) return 0;
+  return mask_ ? length_in_mask(p, d, from, to) : to - from;
+}
+
+// From face to face of the mask's samples.
+double MeasuredRegion::length_in_mask(const Vec3& p, const Vec3& d, double from, double to) const {
+  const Index3 n = mask_->grid.samples();
+  Index3 i{};
+  Vec3 next{}, step{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double x = (p[a] + from * d[a] - mask_->grid.origin[a]) / mask_->grid.spacing[a] + 0.5;
+    // Before the first sample and behind the last one there is one of 0.
+    i[a] = static_cast<std::int64_t>(std::floor(std::clamp(x, -1.0, static_cast<double>(n[a]))));
+    step[a] = d[a] == 0 ? std::numeric_limits<double>::infinity() : mask_->grid.spacing[a] / std::abs(d[a]);
+    next[a] = d[a] == 0 ? step[a] : (mask_face(a, i[a] + (d[a] > 0 ? 1 : 0)) - p[a]) / d[a];
+  }
+  double sum = 0, at_s = from;
+  while (at_s < to) {
+    const auto a = static_cast<std::size_t>(std::min_element(next.begin(), next.end()) - next.begin());
+    const double end = std::clamp(next[a], at_s, to);
+    if (i[0] >= 0 && i[1] >= 0 && i[2] >= 0 && i[0] < n[0] && i[1] < n[1] && i[2] < n[2] &&
+        mask_->samples[at((i[2] * n[1] + i[1]) * n[0] + i[0])] != 0)
+      sum += end - at_s;
+    at_s = end;
+    i[a] += d[a] > 0 ? 1 : -1;
+    if ((d[a] > 0 && i[a] > n[a]) || (d[a] < 0 && i[a] < -1)) break;
+    next[a] += step[a];
+  }
+  return sum;
 }
 
 double MeasuredRegion::mask_face(std::size_t axis, std::int64_t i) const {

@@ -38,10 +38,17 @@ class MeasuredRegion {
   };
   [[nodiscard]] std::optional<Plane> mask_plane(const Vec3& low, const Vec3& high) const;
   [[nodiscard]] bool has_mask() const { return mask_ != nullptr; }
+  /// Whether what the region has across z is the same at all heights between two of faces(2).
+  [[nodiscard]] bool is_upright() const;
+  /// Of an axis, ascending: where the region begins, the mask's faces within, where it ends.
+  [[nodiscard]] std::vector<double> faces(std::size_t axis) const;
+  /// The length in s of what the line p + s d has in the region. Of a mask the sum over its samples.
+  [[nodiscard]] double length_along(const Vec3& p, const Vec3& d) const;
 
  private:
   [[nodiscard]] Place place_in_box(const Vec3& low, const Vec3& high) const;
   [[nodiscard]] Place place_in_mask(const Vec3& low, const Vec3& high) const;
+  [[nodiscard]] double length_in_mask(const Vec3& p, const Vec3& d, double from, double to) const;
   [[nodiscard]] double mask_face(std::size_t axis, std::int64_t i) const;
   [[nodiscard]] std::pair<std::int64_t, std::int64_t> mask_range(std::size_t axis, double low,
                                                                  double high) const;

@@ -9,11 +9,13 @@
 #include <memory>
 
 #include "arrays.hpp"
+#include "asked.hpp"
 #include "held_volume.hpp"
 #include "long_work.hpp"
 #include "parts.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/components.hpp"
+#include "vdvr/expert/mean_of_scan.hpp"
 #include "vdvr/expert/measure.hpp"
 #include "vdvr/expert/measure_line.hpp"
 
@@ -78,6 +80,20 @@ class Measures {
     out["mean"] = pair_of(v.mean);
     out["mass"] = pair_of(v.integral);
     out["region"] = pair_of(v.region);
+    return out;
+  }
+  nb::dict mean_of_scan(const ProjectionSet& scan, const std::optional<ScanSource>& source,
+                        const Understood& understood) {
+    MeanOfScan v;
+    run_long(nb::none(), [&](const Progress& p) {
+      std::string why;
+      MeanNoise noise{{}, understood.flats};
+      if (const auto found = find_noise(scan, {}, source, why)) noise.model = found->model;
+      v = measurement_.mean_of_scan(scan, noise, 0, p);
+    });
+    nb::dict out;
+    out["field_mean"] = v.mean;
+    out["sigma"] = v.sigma ? nb::cast(*v.sigma) : nb::none();
     return out;
   }
   nb::dict extremes() {
@@ -176,6 +192,7 @@ void add_measures(nb::module_& m) {
            "volume"_a, "box"_a.none(), "rounds"_a, "mask"_a.none(), nb::keep_alive<1, 2>())
       .def("volume", &Measures::volume, "least"_a.none(), "largest"_a.none())
       .def("mean", &Measures::mean)
+      .def("mean_of_scan", &Measures::mean_of_scan, "scan"_a, "source"_a.none(), "understood"_a)
       .def("extremes", &Measures::extremes)
       .def("distribution", &Measures::distribution, "edges"_a)
       .def("along", &Measures::along, "p"_a, "q"_a, "samples"_a, "value"_a.none())

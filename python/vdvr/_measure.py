@@ -8,6 +8,7 @@ import numpy as np
 
 from . import _core
 from ._choices import number, numbers
+from ._scans import Scan
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -27,6 +28,7 @@ class Measured:
         below: Optional[float] = None,
         between: Optional[Sequence[float]] = None,
         mean: bool = False,
+        scan: Optional["Scan"] = None,
         extremes: bool = False,
         histogram: Union[int, "ArrayLike", None] = None,
         along: Optional[Sequence[Sequence[float]]] = None,
@@ -43,6 +45,8 @@ class Measured:
         above, below, between : one of them: `volume` where F is at least, at most, or between, and its `fraction`
             of the region.
         mean : `mean` of F, and its integral `mass`.
+        scan : with mean, the projections that the volume was built from: `field_mean`, F's own by these alone, and its
+            standard deviation `sigma`, an estimate, None where the scan's noise is not known.
         extremes : `least` and `largest` F.
         histogram : edges, or a number of bins from the least to the largest that F can be: `edges`, volumes `at_least`
             of {F >= edge} float64 [n, 2], and `within` two edges.
@@ -65,6 +69,10 @@ class Measured:
             out.update(measures.volume(*wanted))
         if mean:
             out.update(measures.mean())
+        if scan is not None:
+            if not mean or not isinstance(scan, Scan):
+                raise _core.InputError("scan: goes with mean=True, and is a vdvr.Scan, or what read_scan returns")
+            out.update(measures.mean_of_scan(scan._core, scan._source, scan._understood))
         if extremes:
             out.update(measures.extremes())
         if histogram is not None:

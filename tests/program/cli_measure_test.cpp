@@ -60,7 +60,53 @@ BOOST_AUTO_TEST_CASE(people_get_one_line_each) {
   BOOST_REQUIRE_MESSAGE(r.code == 0, r.err);
   for (const char* word : {"volume", "fraction", "mean", "least", "largest", " to "})
     BOOST_TEST(r.out.find(word) != std::string::npos, word);
-  BOOST_TEST(std::count(r.out.begin(), r.out.end(), '\n') == 5);
+  // Of the mean one more: its sigma needs the projections.
+  BOOST_TEST(r.out.find("needs --projections") != std::string::npos);
+  BOOST_TEST(std::count(r.out.begin(), r.out.end(), '\n') == 6);
+}
+
+BOOST_AUTO_TEST_CASE(projections_tell_the_mean_itself_and_its_sigma) {
+  for (const std::vector<std::string>& where : {std::vector<std::string>{"--ball", "1,-2,0,2.5"},
+                                                {"--cylinder", "0,1,-2,2,6"},
+                                                {"--roi", "-3,-3,-1,4,2,1"}}) {
+    std::vector<std::string> words{"--mean", "--projections", small_scan(), "--sigma-p", "0.1"};
+    words.insert(words.end(), where.begin(), where.end());
+    const json j = measured(words);
+    // F's own mean lies in V's interval, as for every field within the bound.
+    const double mean = j.at("field_mean").get<double>();
+    BOOST_TEST((lo(j, "mean") <= mean && mean <= hi(j, "mean")));
+    // Sigma is in proportion to that of line integrals.
+    words[4] = "0.2";
+    const double once = j.at("sigma").get<double>(), twice = measured(words).at("sigma").get<double>();
+    BOOST_TEST(once > 0);
+    BOOST_TEST(std::abs(twice / once - 2) <= 4 * 0x1p-53);
+  }
+  const json alone = measured({"--mean"});
+  BOOST_TEST(alone.at("sigma").is_null());
+  BOOST_TEST(alone.at("field_mean").is_null());
+}
+
+BOOST_AUTO_TEST_CASE(pictures_are_of_what_was_asked_for) {
+  const std::string png = at("measured.png");
+  for (const std::vector<std::string>& words : {std::vector<std::string>{"--above", "0.5"},
+                                                {"--between", "0.2,0.6", "--slice-axis", "x"},
+                                                {"--above", "0.5", "--components", "--slice-position", "1"},
+                                                {"--histogram", "9"}}) {
+    std::vector<std::string> all = words;
+    all.insert(all.end(), {"--picture", png, "--size", "200x120", "--force"});
+    BOOST_TEST(measured(all).at("picture") == png);
+    BOOST_TEST(bytes_of(png).substr(1, 3) == "PNG");
+  }
+  const std::string before = bytes_of(png);
+  check_refused({"measure", small_volume(), "--mean", "--picture", png, "--force"}, "--picture");
+  check_refused({"measure", small_volume(), "--above", "1", "--picture", at("x.jpg")}, ".png");
+  check_refused({"measure", small_volume(), "--above", "1", "--picture", png}, "--force");
+  check_refused({"measure", small_volume(), "--above", "1", "--slice-axis", "x"}, "--picture");
+  check_refused(
+      {"measure", small_volume(), "--above", "1", "--picture", png, "--force", "--slice-position", "99"},
+      "misses");
+  BOOST_TEST(bytes_of(png) == before);
+  check_no_temporary_file_is_left();
 }
 
 BOOST_AUTO_TEST_CASE(tables_are_written_whole) {
@@ -98,6 +144,8 @@ BOOST_AUTO_TEST_CASE(what_cannot_be_measured_is_refused_by_name) {
   refused({"--mean", "--roi", "900,0,0,901,1,1"}, "no volume");
   refused({"--mean", "--cylinder", "0,0,2,1,1"}, "--cylinder");
   refused({"--mean", "--mask", small_volume()}, "--mask");
+  refused({"--above", "1", "--projections", small_scan()}, "--projections");
+  refused({"--mean", "--photons", "100"}, "--photons");
   refused({"--histogram", "4", "--range", "1,0"}, "--range");
   check_refused({"measure", small_scan(), "--mean"}, "not a certified volume");
   const std::string windowed = at("windowed.vdvr");

@@ -53,7 +53,7 @@ def make(vdvr, folder):
     scan, out = folder / NAME, folder / "out"
     words = [vdvr, "simulate", "--phantom", "sphere", "--detector", "33x9", "--angles", "48", "-o", str(scan)]
     subprocess.run(words, check=True, capture_output=True)
-    words = [vdvr, "run", str(scan), "--epsilon", "20%", "-o", str(out), "--json"]
+    words = [vdvr, "run", str(scan), "--epsilon", "20%", "--above", "0.5", "-o", str(out), "--json"]
     done = subprocess.run(words, check=True, capture_output=True, text=True)
     return out, (out / "report.html").read_text(encoding="utf-8"), json.loads(done.stdout)
 
@@ -110,6 +110,18 @@ def check_numbers(out, page):
         check(hash_ in text, f"hash {hash_} is not shown")
 
 
+def check_measured(vdvr, out, page, summary):
+    """What `vdvr measure` says of the file stands in the summary and on the page."""
+    words = [vdvr, "measure", str(out / "volume.vdvr"), "--above", "0.5", "--json", "--quiet"]
+    alone = json.loads(subprocess.run(words, check=True, capture_output=True, text=True).stdout)
+    measured = summary["measured"]
+    check(all(measured[name] == alone[name] for name in ("volume", "fraction", "region")), f"measured: {measured}")
+    check(measured["components"]["certain"] == 1, "the sphere is not one component")
+    text = "".join(page.text)
+    check("Measured: F at least 0.5" in text and "share of the region" in text, "no section of what is measured")
+    check({"measured.png", "components.png"} <= {p.name for p in out.glob("*.png")}, "no pictures of what is measured")
+
+
 def check_commands(text, page, vdvr, folder):
     """The `verify` line, given to a shell as it stands, measures the certificate again."""
     lines = [line for line in "".join(page.text).splitlines() if "vdvr verify" in line]
@@ -128,6 +140,7 @@ def test_page(vdvr, folder):
     check_structure(text, page)
     check_pictures(out, page)
     check_numbers(out, page)
+    check_measured(vdvr, out, page, summary)
     check_commands(text, page, vdvr, folder)
     names = list(summary["files"])
     check(names[-2:] == ["report.html", "certificate.json"], f"files: {names}")

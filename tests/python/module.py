@@ -188,6 +188,11 @@ assert told.source == "flats" and abs(told.photons / 2000 - 1) < 0.1 and told.pa
 assert 0.04 < vdvr.read_scan("counts.h5", gaussian=(1, 0)).noise().passed < 0.1
 assert counts.noise(sigma_p=0.5).sigma_p == 0.5 and counts.noise(sigma_p=0.5).photons is None
 assert vdvr.build(counts, "8sigma").certificate["noise"]["source"] == "flats"
+of_counts = vdvr.build(counts, "20%")
+own = of_counts.measure(mean=True, ball=(0, 0, 0, 1.5), scan=counts)
+assert own["mean"][0] <= own["field_mean"] <= own["mean"][1] and 0 < own["sigma"] < of_counts.sigma([[0.0, 0, 0]])[0]
+raises(vdvr.MismatchError, "", lambda: of_counts.measure(mean=True, scan=scan))
+raises(vdvr.InputError, "mean=True", lambda: of_counts.measure(above=0.5, scan=counts))
 raises(vdvr.InputError, "noise", lambda: vdvr.Scan(np.zeros((12, 3, 13), np.float32), angles, center=6.0).noise())
 noisy = vdvr.build(scan, "4sigma", sigma_p=0.05)
 middle = noisy.sigma([[0.0, 0.0, 0.0]])

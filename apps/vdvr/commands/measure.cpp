@@ -8,6 +8,8 @@
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/inputs.hpp"
+#include "apps/vdvr/measure_picture.hpp"
+#include "apps/vdvr/measure_scan.hpp"
 #include "apps/vdvr/measure_tables.hpp"
 #include "apps/vdvr/output.hpp"
 #include "vdvr/error.hpp"
@@ -42,6 +44,13 @@ void declare(Arguments& args) {
       .value("cylinder", "X,Y,Z0,Z1,R", "in an upright cylinder about x, y, from z0 to z1")
       .value("ball", "X,Y,Z,R", "in a ball")
       .value("mask", "VOLUME", "where the nearest sample of a uniform volume is not 0");
+  args.group("The projections themselves")
+      .value("projections", "SCAN",
+             "with --mean: F's own mean by the projections that FILE was built from, and its sigma: what "
+             "their noise leaves in it");
+  add_scan(args);
+  add_noise(args);
+  add_measure_picture(args);
   add_volume_input(args);
   add_common(args);
 }
@@ -79,6 +88,9 @@ Asked asked_of(const Arguments& args) {
   if (asked.along) refuse(args, {"between"}, "has two values; a line takes --above or --below");
   if (asked.along) refuse(args, {"cylinder", "ball", "mask"}, "is not for --along, which --roi alone cuts");
   if (!asked.histogram) refuse(args, {"range"}, "is for --histogram");
+  if (!args.has("mean")) refuse(args, {"projections"}, "is for --mean");
+  if (!args.has("projections")) refuse(args, {"photons", "sigma-p"}, "is for --projections");
+  check_measure_picture(args, asked.has_range() && !asked.along, asked.histogram);
   const int tables = int{asked.along} + int{asked.components} + int{asked.histogram};
   if (args.has("output") && tables != 1)
     throw InputError(
@@ -138,7 +150,9 @@ class Report {
     if (asked_.histogram) histogram();
     if (asked_.along) along();
     if (asked_.components) components();
+    if (args_.has("picture") && !asked_.histogram) slice();
   }
+  std::optional<Image> picture;
   Json json = Json::object();
   std::vector<std::string> lines;
   std::string csv;
@@ -168,8 +182,22 @@ class Report {
     json["mean"] = interval_json(v.mean);
     json["mass"] = interval_json(v.integral);
     json["mean_bound"] = v.bound;
+    json["field_mean"] = nullptr;
+    json["sigma"] = nullptr;
     if (args_.has("mean")) line("mean", interval_text(v.mean, "") + ", over " + region_text_);
+    if (args_.has("projections")) mean_of_scan(v);
+    else if (args_.has("mean")) line("sigma", "not known: the sigma of a mean needs --projections");
     if (args_.has("mass")) line("mass", interval_text(v.integral, "density x " + cubed()));
+  }
+  void mean_of_scan(const MeanMeasure& v) {
+    const ScanOfFile scan = scan_of_file(args_, file_.certificate, progress_);
+    const MeanOfScan own = m_.mean_of_scan(scan.projections, {scan.noise, scan.flats},
+                                           common_options(args_).max_memory, progress_);
+    json["field_mean"] = own.mean;
+    json["sigma"] = own.sigma ? Json(*own.sigma) : Json();
+    json["sigma_of_flats"] = own.sigma ? Json(own.of_flats) : Json();
+    json["sigma_source"] = scan.source;
+    for (const std::string& text : mean_of_scan_lines(own, v, scan.source)) lines.push_back(text);
   }
   void extremes() {
     const ExtremesMeasure v = m_.extremes(progress_);
@@ -200,8 +228,19 @@ class Report {
     set_region(d.region);
     json["histogram"] = distribution_json(d);
     csv = distribution_csv(d);
+    if (args_.has("picture")) {
+      const MeasurePictureOptions o = measure_picture_options(args_);
+      picture = histogram_picture(d, o.width, o.height);
+    }
     line("histogram",
          fmt::format("{} bins from {:.6g} to {:.6g}, of {}", bins, range.lo, range.hi, region_text_));
+  }
+  void slice() {
+    const MeasurePictureOptions o = measure_picture_options(args_);
+    ComponentsOptions of_components;
+    of_components.max_memory_bytes = common_options(args_).max_memory / 2;
+    picture = asked_.components ? component_slice(m_, asked_.range, o, of_components, progress_)
+                                : class_slice(m_, asked_.range, o);
   }
   void along() {
     const auto [p, q] = points_of(args_, "along");
@@ -253,6 +292,8 @@ int measure_command(Arguments& args) {
   if (!args.has("mask")) refuse(args, {"nan-as"}, "is for --mask");
   const fs::path output = args.text_or("output", "");
   if (!output.empty()) check_output(output, common.force, {path});
+  const fs::path picture = args.text_or("picture", "");
+  if (!picture.empty()) check_output(picture, common.force, {path, output});
   if (kind_of(path, args) != InputKind::certified)
     throw InputError(fmt::format("{}: is not a certified volume; build it first", path.string()));
 
@@ -264,6 +305,7 @@ int measure_command(Arguments& args) {
   report.run();
   throw_if_stopped();
   if (!output.empty()) io::write_file(output, report.csv);
+  if (report.picture) write_png(picture, *report.picture);
   progress.clear();
 
   Json json = {{"file", path.string()},
@@ -274,10 +316,12 @@ int measure_command(Arguments& args) {
   if (asked.range.largest) json["at_most"] = *asked.range.largest;
   json.update(report.json);
   if (!output.empty()) json["output"] = output.string();
+  if (!picture.empty()) json["picture"] = picture.string();
   json["seconds"] = seconds_json(progress.seconds());
   print_result(common, json, [&] {
     for (const std::string& line : report.lines) fmt::print("{}\n", line);
-    if (!output.empty()) fmt::print("written        {}\n", output.string());
+    for (const fs::path& written : {output, picture})
+      if (!written.empty()) fmt::print("written        {}\n", written.string());
   });
   return 0;
 }

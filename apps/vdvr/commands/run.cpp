@@ -34,6 +34,7 @@ struct Outcome {
   BuildResult built;
   VerifyResult verified;
   ErrorSlice error;
+  std::optional<MeasuredByRun> measured;
   std::string sampler, sampler_reason;
   std::vector<std::pair<std::string, std::string>> files;  ///< name and what it shows
   std::map<std::string, std::string> outside;              ///< of a picture: what no certificate covers
@@ -50,8 +51,9 @@ auto timed(std::map<std::string, double>& seconds, const std::string& name, Step
 }
 
 std::vector<std::string> file_names() {
-  return {"volume.vdvr", "dvr.png",   "bound.png", "iso.png",     "slice-x.png",     "slice-y.png",
-          "slice-z.png", "error.png", "noise.png", "report.html", "certificate.json"};
+  return {"volume.vdvr",    "dvr.png",     "bound.png",       "iso.png",   "slice-x.png",
+          "slice-y.png",    "slice-z.png", "error.png",       "noise.png", "measured.png",
+          "components.png", "report.html", "certificate.json"};
 }
 
 /// Where the noise is known: the bounds in its units, on the error picture's slice.
@@ -140,6 +142,17 @@ void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, con
   draw_noise(folder, out);
 }
 
+/// On the slice through the dense part.
+void draw_measured(const OutputFolder& folder, Outcome& out, const Progress& progress) {
+  if (!out.measured) return;
+  MeasuredByRun& m = *out.measured;
+  measure_for_run(m, out.built.volume, out.built.certificate, brightness_of(out.built.volume).dense_center[2],
+                  kPictureSide, folder, progress);
+  if (!m.why_not.empty()) return;
+  out.files.emplace_back("measured.png", fmt::format("where {}: surely, possibly (striped), or not", m.what));
+  out.files.emplace_back("components.png", "separate places of it, each in a colour");
+}
+
 std::string bytes_of(const std::filesystem::path& path) {
   std::string bytes(std::filesystem::file_size(path), '\0');
   std::ifstream in(path, std::ios::binary);
@@ -182,6 +195,7 @@ void write_report(const Device& device, const Arguments& args, const OutputFolde
     page.pictures.push_back(
         {name, caption, outside == out.outside.end() ? "" : outside->second, bytes_of(folder.file(name))});
   }
+  page.measured = out.measured;
   page.run_words = run_words(args);
   page.verify_words = verify_words(args, folder);
   io::write_file(folder.file("report.html"), report_page(page));
@@ -192,6 +206,7 @@ Json outcome_json(const std::filesystem::path& folder, const Outcome& out, std::
   Json files = Json::object();
   for (const auto& [name, what] : out.files) files[name] = what;
   return {
+      {"measured", out.measured ? measured_json(*out.measured) : Json()},
       {"output", folder.string()},
       {"files", files},
       {"outside_certificate", out.outside},
@@ -217,6 +232,9 @@ void print_outcome(const std::filesystem::path& folder, const Outcome& out, std:
   print_verification(out.verified, c);
   fmt::print("error slice    largest |V - F| on {} pixels: {:.4g}, {:.1f} % of the tolerance\n",
              out.error.pixels, out.error.max_error, 100 * out.error.max_error / c.epsilon_abs);
+  if (out.measured)
+    for (const std::string& line : measured_lines(*out.measured, out.built.volume.grid.unit))
+      fmt::print("{}\n", line);
   print_storage(out.built.volume, file_bytes);
   fmt::print("rendered with  {} ({})\n", out.sampler, out.sampler_reason);
   print_seconds(out.seconds);
@@ -235,6 +253,7 @@ int run_steps(const Arguments& args, const CommonOptions& common, Wanted wanted,
   ProgressLine line(args.who(), common.quiet);
   const Progress progress = line.callback();
   Outcome out;
+  out.measured = asked_to_measure(args);
   // What was understood comes first: whoever sees that it is wrong need not wait for the rest.
   const auto show = [&](const Planned& read) {
     line.clear();
@@ -260,6 +279,7 @@ int run_steps(const Arguments& args, const CommonOptions& common, Wanted wanted,
   out.files.emplace_back("volume.vdvr", "the certified volume");
   timed(out.seconds, "pictures", [&] {
     draw_pictures(device, folder, out, progress);
+    draw_measured(folder, out, progress);
     return 0;
   });
   if (!(out.error.max_error <= certificate.epsilon_abs))
@@ -284,11 +304,13 @@ int run_command(Arguments& args) {
   args.positional("IN", "projections")
       .value("output,o", "DIR", "the folder for volume, pictures, report.html and certificate");
   add_certify_options(args);
+  add_measured(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
   Wanted wanted = wanted_to_certify(args, true);
   if (wanted.options.plan.comparison.is_never_certified())
     throw InputError("--terms grid, --closing none and --paper make volumes for comparison: use vdvr build");
+  asked_to_measure(args);
   const auto output = args.path("output"), volume = output / "volume.vdvr";
   kind_of(args.path("IN"), args);
   OutputFolder folder(output, file_names(), common.force || continues(args, volume));

@@ -26,7 +26,6 @@
 #include "host/field/fdk/filter_cone.hpp"
 #include "host/field/fdk/reconstruct_cone.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/expert/extend_rows.hpp"
 
 namespace vdvr {
 namespace {
@@ -34,33 +33,6 @@ namespace {
 // Columns to either side whose g^2 is taken one by one, and columns of a block beyond.
 constexpr std::int64_t reach = 12, block = 8;
 constexpr std::int64_t rows_together = 16;
-
-// The variance of samples of the scan's rows, which may be longer than the detector's: those of half
-// acquisition were multiplied by a factor f, and have f^2 times the variance. Samples that padding added are
-// copies of others and are left out: by t columns from the edge they change sigma by less than 3 % / t^2
-// (docs/noise.md).
-class SampleVariance {
- public:
-  SampleVariance(const ParallelGeometry& g, const LineIntegralNoise& noise)
-      : variance_(noise),
-        factors_(row_factors(g)),
-        columns_(g.columns),
-        own_(own_detector(g).columns),
-        before_(g.extension.before) {}
-  double operator()(std::int64_t row, std::int64_t column, float sample) const {
-    const auto factor = static_cast<double>(factors_[at(column)]);
-    if (factor == 0) return 0;
-    const std::size_t pixel = at(row * own_ + column - before_);
-    return factor * factor * variance_(pixel, static_cast<double>(sample) / factor);
-  }
-  /// Of a view's samples, one row after another.
-  double of_sample(std::int64_t i, float sample) const { return (*this)(i / columns_, i % columns_, sample); }
-
- private:
-  PixelVariance variance_;
-  std::vector<float> factors_;
-  std::int64_t columns_, own_, before_;
-};
 
 double largest_variance(const ProjectionSet& scan, const LineIntegralNoise& noise) {
   const std::int64_t pixels = scan.geometry.rows * scan.geometry.columns;

@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "host/base/opencl/state.hpp"
+#include "host/base/system/casts.hpp"
+#include "vdvr/expert/extend_rows.hpp"
 #include "vdvr/expert/field_options.hpp"
 #include "vdvr/expert/grid.hpp"
 #include "vdvr/expert/line_noise.hpp"
@@ -54,6 +56,33 @@ class PixelVariance {
 
  private:
   const LineIntegralNoise& noise_;
+};
+
+/// The variance of samples of the scan's rows, which may be longer than the detector's: those of half
+/// acquisition were multiplied by a factor f, and have f^2 times the variance. Samples that padding added are
+/// copies of others and are left out: by t columns from the edge they change sigma by less than 3 % / t^2
+/// (docs/noise.md).
+class SampleVariance {
+ public:
+  SampleVariance(const ParallelGeometry& g, const LineIntegralNoise& noise)
+      : variance_(noise),
+        factors_(row_factors(g)),
+        columns_(g.columns),
+        own_(own_detector(g).columns),
+        before_(g.extension.before) {}
+  double operator()(std::int64_t row, std::int64_t column, float sample) const {
+    const auto factor = static_cast<double>(factors_[at(column)]);
+    if (factor == 0) return 0;
+    const std::size_t pixel = at(row * own_ + column - before_);
+    return factor * factor * variance_(pixel, static_cast<double>(sample) / factor);
+  }
+  /// Of a view's samples, one row after another.
+  double of_sample(std::int64_t i, float sample) const { return (*this)(i / columns_, i % columns_, sample); }
+
+ private:
+  PixelVariance variance_;
+  std::vector<float> factors_;
+  std::int64_t columns_, own_, before_;
 };
 
 /// float variance[z][y][x] / scale on the grid's samples, world units; scale brings them to order one.

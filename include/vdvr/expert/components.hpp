@@ -39,6 +39,7 @@ struct MeasuredComponent {
 struct ComponentOfPoint {
   Answer within = Answer::no;                  ///< whether F is in the range there
   std::optional<std::int64_t> possible, sure;  ///< numbers of its possible component and its sure part
+  bool certain = false;                        ///< MeasuredComponent::certain() of the former
 };
 /// Whether two points are connected in what lies in the range.
 VDVR_API Answer connected(const ComponentOfPoint& a, const ComponentOfPoint& b);

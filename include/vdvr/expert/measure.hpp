@@ -89,6 +89,9 @@ struct ComponentsOptions;
 struct ComponentTable;
 struct LineOptions;
 struct LineMeasure;
+struct MeanOfScan;
+struct MeanNoise;
+struct ProjectionSet;
 
 class VDVR_API Measurement {
  public:
@@ -105,6 +108,11 @@ class VDVR_API Measurement {
   [[nodiscard]] VolumeMeasure volume(const ValueRange& range, const MeasureOptions& options = {},
                                      const Progress& progress = {}) const;
   [[nodiscard]] MeanMeasure mean(const Progress& progress = {}) const;
+  /// F's own mean over the region, and what noise leaves in it, by the projections that the volume was built
+  /// of (mean_of_scan.hpp). Throws MismatchError as check_input(), ResourceError.
+  [[nodiscard]] MeanOfScan mean_of_scan(const ProjectionSet& scan, const MeanNoise& noise,
+                                        std::uint64_t max_memory_bytes = 0,
+                                        const Progress& progress = {}) const;
   [[nodiscard]] ExtremesMeasure extremes(const Progress& progress = {}) const;
   /// `edges` ascend; throws InputError where they do not, or are fewer than two.
   [[nodiscard]] Distribution distribution(const std::vector<double>& edges,
@@ -115,6 +123,9 @@ class VDVR_API Measurement {
   /// From p to q, as far as that is covered, in the certificate's region of interest and in the box; other
   /// regions do not cut it. Throws InputError for points that are not finite or one and the same.
   [[nodiscard]] LineMeasure along(const Vec3& p, const Vec3& q, const LineOptions& options) const;
+
+  /// For the library's own use.
+  [[nodiscard]] const measured::Field& field() const { return *field_; }
 
  private:
   std::unique_ptr<const measured::Field> field_;
