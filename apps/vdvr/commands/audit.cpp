@@ -1,0 +1,254 @@
+// vdvr audit: how far anybody's volume lies from F, at its samples and between them.
+#include "vdvr/expert/audit.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "apps/common/progress.hpp"
+#include "apps/vdvr/inputs.hpp"
+#include "apps/vdvr/output.hpp"
+#include "vdvr/error.hpp"
+#include "vdvr/expert/audit_picture.hpp"
+#include "vdvr/expert/certified_region.hpp"
+#include "vdvr/expert/volume_file.hpp"
+
+namespace fs = std::filesystem;
+
+namespace vdvr::cli {
+namespace {
+
+/// 3 %, or a density.
+void take_within(const Arguments& args, AuditOptions& options) {
+  if (!args.has("within")) return;
+  options.within_share = args.text("within").ends_with('%');
+  options.within = options.within_share ? fraction_option(args, "within") : args.positive_or("within", 0);
+}
+
+AuditOptions audit_options(const Arguments& args) {
+  AuditOptions options;
+  options.field = field_options(args);
+  options.between = between_of(args.has("interpolate") ? args.choice("interpolate", "linear") : "linear")
+                        .value_or(Between::linear);
+  options.as_is = args.has("as-is");
+  if (args.has("radius")) options.radius = args.positive_or("radius", 0);
+  options.roi = build_options(args).roi;
+  take_within(args, options);
+  return options;
+}
+
+/// In the scan's units, where both units are lengths that can be converted.
+double unit_factor(const std::string& from, const std::string& to) {
+  static const std::map<std::string, double> metres{{"m", 1}, {"cm", 1e-2}, {"mm", 1e-3}, {"um", 1e-6}};
+  const auto a = metres.find(from), b = metres.find(to);
+  return a != metres.end() && b != metres.end() ? a->second / b->second : 1;
+}
+
+struct PlacedVolume {
+  Volume volume;
+  std::string spacing_from = "option", origin_from = "option";
+};
+
+/// Options, else the file, else what volumes without a place have by default: the detector's pitch at the
+/// axis, and the middle on the axis and the middle row. A file of spacing 1 pixel, or whose first sample lies
+/// at 0, 0, 0, has stated neither.
+PlacedVolume placed(Volume volume, const Arguments& args, const ProjectionSet& scan,
+                    const FieldOptions& field) {
+  const GridOptions asked = grid_options(args);
+  PlacedVolume p{std::move(volume)};
+  Grid& g = p.volume.grid;
+  const double factor = unit_factor(g.unit, scan.geometry.unit);
+  const bool states_spacing = g.unit != "pixel" || g.spacing != Vec3{1, 1, 1},
+             states_origin = g.origin != Vec3{0, 0, 0};
+  for (std::size_t a = 0; a < 3; ++a) {
+    g.spacing[a] *= factor;
+    g.origin[a] *= factor;
+  }
+  g.unit = scan.geometry.unit;
+  const Grid usual = certified_grid(scan, field, {});
+  if (asked.spacing) {
+    const double s = *asked.spacing;
+    g.spacing = {s, s, asked.spacing_z.value_or(s)};
+  } else if (!states_spacing) {
+    g.spacing = usual.spacing;
+    p.spacing_from = "the detector's pitch";
+  } else {
+    p.spacing_from = "file";
+  }
+  if (asked.origin) {
+    g.origin = *asked.origin;
+  } else if (!states_origin) {
+    const double middle = 0.5 * (usual.origin[2] + usual.position(usual.cells)[2]);
+    for (std::size_t a = 0; a < 3; ++a)
+      g.origin[a] = -0.5 * static_cast<double>(g.cells[a]) * g.spacing[a] + (a == 2 ? middle : 0.0);
+    p.origin_from = "centred on the axis";
+  } else {
+    p.origin_from = "file";
+  }
+  return p;
+}
+
+// --- what is printed ---
+
+Json figures_json(const AuditFigures& f, Between between) {
+  const auto share = [&](double e) { return f.span() > 0 ? Json(e / f.span()) : Json(); };
+  return {{"samples", f.samples},
+          {"range", {f.range.first, f.range.second}},
+          {"rms", f.rms},
+          {"rms_share", share(f.rms)},
+          {"largest", f.largest},
+          {"largest_share", share(f.largest)},
+          {"largest_at", f.largest_at},
+          {"interpolation", text_of(between)},
+          {"lower", f.lower},
+          {"lower_share", share(f.lower)},
+          {"lower_at", f.lower_at},
+          {"volume_there", f.w_there},
+          {"field_there", f.f_there},
+          {"upper", f.upper ? Json(*f.upper) : Json()},
+          {"upper_share", f.upper ? share(*f.upper) : Json()},
+          {"why_no_upper", f.why_no_upper},
+          {"finest_rate", f.finest_rate}};
+}
+
+Json registration_json(const Registration& r) {
+  return {{"found", r.words},
+          {"axes", r.axes},
+          {"mirrored", r.mirrored},
+          {"scale", r.scale},
+          {"offset", r.offset},
+          {"shift_samples", r.shift},
+          {"center_off", r.center},
+          {"filter", text_of(r.window)},
+          {"unexplained", r.unexplained},
+          {"unexplained_registered", r.unexplained_registered}};
+}
+
+void print_figures(const AuditFigures& f, Between between) {
+  const auto both = [&](double e) {
+    return f.span() > 0 ? fmt::format("{:.4g} ({:.3g} % of F's range)", e, 100 * e / f.span())
+                        : fmt::format("{:.4g}", e);
+  };
+  fmt::print("  at samples   rms {}, largest {} at {}\n", both(f.rms), both(f.largest),
+             vec_text(f.largest_at));
+  fmt::print("  between      {}: at least {} at {}, where it is {:.6g} and F {:.6g}\n", text_of(between),
+             both(f.lower), vec_text(f.lower_at), f.w_there, f.f_there);
+  if (f.upper)
+    fmt::print("  certified    nowhere above {} in {} compared samples' cells\n", both(*f.upper), f.samples);
+  else fmt::print("  certified    nothing: {}\n", f.why_no_upper);
+}
+
+void print_audit(const Audit& a, const AuditOptions& options) {
+  if (a.registration) {
+    const Registration& r = *a.registration;
+    if (r.words.empty())
+      fmt::print("registered     nothing is off: turns, factor, shift, centre and window fit\n");
+    for (std::size_t i = 0; i < r.words.size(); ++i)
+      fmt::print("{:<15}{}\n", i == 0 ? "registered" : "", r.words[i]);
+    fmt::print("{:<15}F leaves {:.3g} % of its variance unexplained{}\n", "", 100 * r.unexplained,
+               r.words.empty()
+                   ? ""
+                   : fmt::format(", {:.3g} % once that is put right", 100 * r.unexplained_registered));
+  }
+  fmt::print("as it is\n");
+  print_figures(a.as_is, options.between);
+  if (a.registered) {
+    fmt::print("once that is put right\n");
+    print_figures(*a.registered, options.between);
+  }
+  fmt::print(
+      "a distance     to F, the filtered back-projection of this scan. What is no such back-projection, as "
+      "of an "
+      "iterative program, may lie far from F and be right; `vdvr residual` tells what F itself does not "
+      "explain\n");
+}
+
+std::string verdict(const fs::path& path, const AuditFigures& f) {
+  const double e = *f.within;
+  if (f.lower > e)
+    return fmt::format("{}: |W - F| reaches {:.6g} > {:.6g} at {}", path.string(), f.lower, e,
+                       vec_text(f.lower_at));
+  if (f.upper)
+    return fmt::format("{}: not shown to be within {:.6g}: |W - F| reaches {:.6g} and may reach {:.6g}",
+                       path.string(), e, f.lower, *f.upper);
+  return fmt::format(
+      "{}: not shown to be within {:.6g}: |W - F| reaches {:.6g}, and there is no upper end: {}",
+      path.string(), e, f.lower, f.why_no_upper);
+}
+
+void declare(Arguments& args) {
+  args.positional("VOLUME", "a uniform volume of any program: MHA, NRRD, NPY, FILE.h5:/dataset, TIFF slices")
+      .value("projections", "SCAN", "the projections that it was reconstructed from")
+      .value("interpolate", "nearest|linear|cubic", "what it is between its samples (default linear)")
+      .value("within", "E|P%",
+             "exit code 1 unless it lies within E of F everywhere, or within a share of F's range")
+      .flag("as-is", "do not look for turns, mirrors, factors, shifts, another centre or window")
+      .value("radius", "R", "compare only what is that near to the axis")
+      .value("output,o", "PNG", "a picture: |W - F| on the slice through the worst point");
+  add_volume_input(args);
+  add_scan(args);
+  add_field(args);
+  add_grid(args);
+  add_common(args);
+}
+
+}  // namespace
+
+int audit_command(Arguments& args) {
+  declare(args);
+  if (!args.parse()) return 0;
+  const CommonOptions common = common_options(args);
+  const fs::path path = args.path("VOLUME"), projections = args.path("projections"),
+                 picture = args.has("output") ? args.path("output") : fs::path();
+  const AuditOptions options = audit_options(args);
+  refuse(args, {"size"}, "the volume has its samples");
+  if (!picture.empty()) {
+    if (picture.extension() != ".png")
+      throw InputError(fmt::format("{}: write the picture as .png", picture.string()));
+    check_output(picture, common.force, {path, projections});
+  }
+  if (path.extension() == ".vdvr")
+    throw InputError(
+        fmt::format("{}: a certified volume; `vdvr verify` measures its certificate again", path.string()));
+
+  ProgressLine progress(args.who(), common.quiet);
+  Volume volume = load_volume(path, args);
+  const ProjectionSet scan = load_scan(projections, args, options.field, progress.callback());
+  Device device = open_device(common);
+  const PlacedVolume w = placed(std::move(volume), args, scan, options.field);
+  const Audit result = audit(device, scan, w.volume, options, progress.callback());
+  if (!picture.empty())
+    write_png(picture, audit_picture(device, scan, w.volume, result, options, progress.callback()));
+  progress.clear();
+
+  const AuditFigures& f = result.as_is;
+  const bool met = !f.within || (f.upper && *f.upper <= *f.within);
+  Json json = {{"volume", path.string()},
+               {"projections", projections.string()},
+               {"grid", grid_json(w.volume.grid)},
+               {"spacing_from", w.spacing_from},
+               {"origin_from", w.origin_from},
+               {"geometry", geometry_json(scan.geometry)},
+               {"registration", result.registration ? registration_json(*result.registration) : Json()},
+               {"as_is", figures_json(f, options.between)},
+               {"registered", result.registered ? figures_json(*result.registered, options.between) : Json()},
+               {"within", f.within ? Json(*f.within) : Json()},
+               {"met", f.within ? Json(met) : Json()},
+               {"picture", picture.empty() ? Json() : Json(picture.string())},
+               {"device", device.info().name},
+               {"seconds", seconds_json(progress.seconds())}};
+  print_result(common, json, [&] {
+    print_scan(scan);
+    print_grid(w.volume.grid);
+    if (w.spacing_from != "file" || w.origin_from != "file")
+      fmt::print("{:<15}spacing: {}; origin: {}\n", "", w.spacing_from, w.origin_from);
+    print_audit(result, options);
+    if (!picture.empty()) fmt::print("written        {}\n", picture.string());
+  });
+  if (!met) throw MismatchError(verdict(path, f));
+  return 0;
+}
+
+}  // namespace vdvr::cli
