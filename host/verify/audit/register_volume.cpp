@@ -1,18 +1,14 @@
 // Turns and mirrors by brute force on a thinned grid, then windows, centres and shifts by F itself: F can be
 // made anywhere, so that W is never interpolated.
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <utility>
 
 #include "host/base/system/casts.hpp"
-#include "host/base/system/parallel.hpp"
 #include "host/field/fdk/filter_cone.hpp"
+#include "host/verify/audit/best_orientation.hpp"
 #include "host/verify/audit/fit.hpp"
-#include "host/verify/audit/orientation.hpp"
 #include "host/verify/audit/registration_words.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/audit.hpp"
@@ -21,83 +17,7 @@
 namespace vdvr {
 namespace {
 
-constexpr int kReach = 2;             // samples and columns
 constexpr double kCenterStep = 0.25;  // columns
-
-struct Placed {
-  Orientation orientation;
-  Index3 shift{0, 0, 0};
-  double unexplained = 1;
-};
-
-/// The shift, in whole samples, under which F explains most of W in this orientation.
-Placed best_shift(const Volume& w, const Orientation& o, const ThinnedGrid& thin,
-                  const std::vector<double>& f) {
-  Placed best;
-  best.orientation = o;
-  const Index3 n = w.grid.samples(), m = oriented(w.grid, o).samples();
-  std::vector<double> values, truth;
-  for (int code = 0; code < 125; ++code) {
-    const Index3 shift{code % 5 - kReach, code / 5 % 5 - kReach, code / 25 - kReach};
-    values.clear();
-    truth.clear();
-    for (std::size_t i = 0; i < f.size(); ++i) {
-      Index3 s = thin.samples()[i];
-      bool in = true;
-      for (std::size_t a = 0; a < 3; ++a) {
-        s[a] += shift[a];
-        in = in && s[a] >= 0 && s[a] < m[a];
-      }
-      if (!in) continue;
-      const Index3 p = source_of(s, w.grid, o);
-      values.push_back(static_cast<double>(w.samples[at((p[2] * n[1] + p[1]) * n[0] + p[0])]));
-      truth.push_back(f[i]);
-    }
-    // What lies beyond the edge must not make a shift look good.
-    if (2 * values.size() < f.size()) continue;
-    const double unexplained = linear_fit(values, truth).unexplained;
-    const auto size = [](const Index3& k) { return std::abs(k[0]) + std::abs(k[1]) + std::abs(k[2]); };
-    if (unexplained < best.unexplained * (1 - 1e-9) ||
-        (unexplained <= best.unexplained && size(shift) < size(best.shift))) {
-      best.unexplained = unexplained;
-      best.shift = shift;
-    }
-  }
-  return best;
-}
-
-/// The one whose own shift explains most; a simpler one where it explains nearly as much.
-Placed best_orientation(Device& device, const ProjectionSet& scan, const Volume& w,
-                        const AuditOptions& options, const Progress& progress) {
-  const Coverage coverage = certified_coverage(scan, options.field);
-  std::map<std::array<int, 3>, std::pair<ThinnedGrid, std::vector<double>>> of_axes;
-  FitSettings plain;
-  plain.window = options.field.filter;
-  for (const Orientation& o : orientations()) {
-    if (of_axes.count(o.axes) > 0) continue;
-    throw_if_stopped();
-    report(progress, "register", static_cast<double>(of_axes.size()) / 100);
-    try {
-      ThinnedGrid thin(oriented(w.grid, o), coverage, options, kReach + 1);
-      std::vector<double> f = thin.field(device, scan, options.field, plain);
-      of_axes.emplace(o.axes, std::pair(std::move(thin), std::move(f)));
-    } catch (const InputError&) {
-      if (o.is_plain()) throw;  // a long volume across the axis: it cannot be so
-    }
-  }
-  std::vector<Placed> placed(orientations().size());
-  parallel_for(static_cast<std::int64_t>(placed.size()), {}, "", [&](std::int64_t i) {
-    const auto known = of_axes.find(orientations()[at(i)].axes);
-    if (known != of_axes.end())
-      placed[at(i)] = best_shift(w, orientations()[at(i)], known->second.first, known->second.second);
-  });
-  double least = 1;
-  for (const Placed& p : placed) least = std::min(least, p.unexplained);
-  // As in earns_its_keep(); of two that are alike the first, which is simpler.
-  if (placed.front().unexplained <= 2 * least + kNegligible) return placed.front();
-  return *std::find_if(placed.begin(), placed.end(),
-                       [&](const Placed& p) { return p.unexplained <= 1.05 * least + kNegligible; });
-}
 
 /// Fits of one oriented volume.
 class Fitter {
@@ -119,6 +39,9 @@ class Fitter {
 
   [[nodiscard]] bool moves_center() const { return moves_center_; }
   [[nodiscard]] LinearFit fit(const FitSettings& s) { return linear_fit(w_, field(s)); }
+  [[nodiscard]] bool is_constant() const {
+    return *std::min_element(w_.begin(), w_.end()) == *std::max_element(w_.begin(), w_.end());
+  }
   [[nodiscard]] double spread() const { return std::sqrt(variance(w_)); }
 
   /// Gauss and Newton's steps in the shift and, where asked, the centre, from where they are; a step that
@@ -327,29 +250,38 @@ FitSettings what_counts(Fitter& fitter, const FitSettings& plain, FitSettings s)
 
 Registration register_volume(Device& device, const ProjectionSet& scan, const Volume& volume,
                              const AuditOptions& options, const Progress& progress) {
-  const Placed placed = best_orientation(device, scan, volume, options, progress);
   FitSettings plain;
   plain.window = options.field.filter;
   Registration r;
   {
     Fitter as_it_is(device, scan, volume, options, progress);
     r.unexplained = as_it_is.fit(plain).unexplained;
-    if (!(as_it_is.spread() > 0)) throw InputError("all samples of the volume that are covered are equal");
+    if (as_it_is.is_constant()) throw InputError("all samples of the volume that are covered are equal");
   }
-  const bool turned = !placed.orientation.is_plain();
-  const Volume copy = turned ? oriented(volume, placed.orientation) : Volume{};
-  Fitter fitter(device, scan, turned ? copy : volume, options, progress);
-  Vec3 shift{};
-  for (std::size_t a = 0; a < 3; ++a) shift[a] = static_cast<double>(placed.shift[a]);
-  const FitSettings found = what_counts(fitter, plain, best_settings(fitter, plain, shift));
-  const LinearFit linear = fitter.fit(found);
-  r.axes = placed.orientation.axes;
-  r.mirrored = placed.orientation.mirrored;
-  r.shift = found.shift;
-  r.center = found.center;
-  r.window = found.window;
-  r.unexplained_registered = linear.unexplained;
-  name_faults(r, linear, fitter.spread(), scan, options.field);
+  Orientation orientation;
+  FitSettings found = plain;
+  // What else is off hides a mirror of an object that is nearly its own, and is seen the better without it.
+  for (int round = 0; round < 2; ++round) {
+    const Placed placed = best_orientation(device, scan, volume, options, found, orientation, progress);
+    if (round > 0 && placed.orientation == orientation) break;
+    orientation = placed.orientation;
+    const Volume copy = orientation.is_plain() ? Volume{} : oriented(volume, orientation);
+    Fitter fitter(device, scan, orientation.is_plain() ? volume : copy, options, progress);
+    Vec3 shift = found.shift;
+    for (std::size_t a = 0; a < 3; ++a) shift[a] += static_cast<double>(placed.shift[a]);
+    found = what_counts(fitter, plain, best_settings(fitter, plain, shift));
+    const LinearFit linear = fitter.fit(found);
+    r.axes = orientation.axes;
+    r.mirrored = orientation.mirrored;
+    r.shift = found.shift;
+    r.center = found.center;
+    r.window = found.window;
+    r.unexplained_registered = linear.unexplained;
+    r.scale = 1;
+    r.offset = 0;
+    r.words.clear();
+    name_faults(r, linear, fitter.spread(), scan, options.field);
+  }
   return r;
 }
 
