@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <map>
 #include <nlohmann/json.hpp>
 
 #include "apps/common/progress.hpp"
@@ -12,8 +10,6 @@
 #include "apps/vdvr/output.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/audit_picture.hpp"
-#include "vdvr/expert/certified_region.hpp"
-#include "vdvr/expert/volume_file.hpp"
 
 namespace fs = std::filesystem;
 
@@ -39,55 +35,13 @@ AuditOptions audit_options(const Arguments& args) {
   return options;
 }
 
-/// In the scan's units, where both units are lengths that can be converted.
-double unit_factor(const std::string& from, const std::string& to) {
-  static const std::map<std::string, double> metres{{"m", 1}, {"cm", 1e-2}, {"mm", 1e-3}, {"um", 1e-6}};
-  const auto a = metres.find(from), b = metres.find(to);
-  return a != metres.end() && b != metres.end() ? a->second / b->second : 1;
-}
-
-struct PlacedVolume {
-  Volume volume;
-  std::string spacing_from = "option", origin_from = "option";
-};
-
-/// Options, else the file, else what volumes without a place have by default: the detector's pitch at the
-/// axis, and the middle on the axis and the middle row. A file of spacing 1 pixel, or whose first sample lies
-/// at 0, 0, 0, has stated neither.
-PlacedVolume placed(Volume volume, const Arguments& args, const ProjectionSet& scan,
-                    const FieldOptions& field) {
+PlaceOptions place_options(const Arguments& args) {
   const GridOptions asked = grid_options(args);
-  PlacedVolume p{std::move(volume)};
-  Grid& g = p.volume.grid;
-  const double factor = unit_factor(g.unit, scan.geometry.unit);
-  const bool states_spacing = g.unit != "pixel" || g.spacing != Vec3{1, 1, 1},
-             states_origin = g.origin != Vec3{0, 0, 0};
-  for (std::size_t a = 0; a < 3; ++a) {
-    g.spacing[a] *= factor;
-    g.origin[a] *= factor;
-  }
-  g.unit = scan.geometry.unit;
-  const Grid usual = certified_grid(scan, field, {});
-  if (asked.spacing) {
-    const double s = *asked.spacing;
-    g.spacing = {s, s, asked.spacing_z.value_or(s)};
-  } else if (!states_spacing) {
-    g.spacing = usual.spacing;
-    p.spacing_from = "the detector's pitch";
-  } else {
-    p.spacing_from = "file";
-  }
-  if (asked.origin) {
-    g.origin = *asked.origin;
-  } else if (!states_origin) {
-    const double middle = 0.5 * (usual.origin[2] + usual.position(usual.cells)[2]);
-    for (std::size_t a = 0; a < 3; ++a)
-      g.origin[a] = -0.5 * static_cast<double>(g.cells[a]) * g.spacing[a] + (a == 2 ? middle : 0.0);
-    p.origin_from = "centred on the axis";
-  } else {
-    p.origin_from = "file";
-  }
-  return p;
+  PlaceOptions place;
+  if (asked.spacing)
+    place.spacing = Vec3{*asked.spacing, *asked.spacing, asked.spacing_z.value_or(*asked.spacing)};
+  place.origin = asked.origin;
+  return place;
 }
 
 // --- what is printed ---
@@ -136,7 +90,8 @@ void print_figures(const AuditFigures& f, Between between) {
   fmt::print("  between      {}: at least {} at {}, where it is {:.6g} and F {:.6g}\n", text_of(between),
              both(f.lower), vec_text(f.lower_at), f.w_there, f.f_there);
   if (f.upper)
-    fmt::print("  certified    nowhere above {} in {} compared samples' cells\n", both(*f.upper), f.samples);
+    fmt::print("  certified    nowhere above {} in cells whose samples all views see ({} samples)\n",
+               both(*f.upper), f.samples);
   else fmt::print("  certified    nothing: {}\n", f.why_no_upper);
 }
 
@@ -217,7 +172,7 @@ int audit_command(Arguments& args) {
   Volume volume = load_volume(path, args);
   const ProjectionSet scan = load_scan(projections, args, options.field, progress.callback());
   Device device = open_device(common);
-  const PlacedVolume w = placed(std::move(volume), args, scan, options.field);
+  const PlacedVolume w = placed_volume(std::move(volume), scan, options.field, place_options(args));
   const Audit result = audit(device, scan, w.volume, options, progress.callback());
   if (!picture.empty())
     write_png(picture, audit_picture(device, scan, w.volume, result, options, progress.callback()));

@@ -33,7 +33,18 @@ LinearFit linear_fit(const std::vector<double>& w, const std::vector<double>& f)
   LinearFit fit;
   fit.scale = ff > 0 ? wf / ff : 0;
   fit.offset = mean_w - fit.scale * mean_f;
-  fit.unexplained = ww > 0 && ff > 0 ? std::max(0.0, 1 - wf * wf / (ww * ff)) : 1;
+  fit.offset_alone = mean_w - mean_f;
+  if (!(ww > 0 && ff > 0)) return fit;
+  fit.unexplained = std::max(0.0, 1 - wf * wf / (ww * ff));
+  fit.without_scale = (ww - 2 * wf + ff) / ww;
+  // What is left of the means is left in every sample.
+  const double through_zero = (wf + n * mean_w * mean_f) / (ff + n * mean_f * mean_f);
+  const auto left = [&](double scale) {
+    const double mean = mean_w - scale * mean_f;
+    return (ww - 2 * scale * wf + scale * scale * ff + n * mean * mean) / ww;
+  };
+  fit.without_offset = left(through_zero);
+  fit.without_both = left(1);
   return fit;
 }
 

@@ -13,7 +13,10 @@ namespace vdvr {
 /// W = scale * F + offset, by least squares.
 struct LinearFit {
   double scale = 0, offset = 0;
-  double unexplained = 1;  ///< share of W's variance
+  double unexplained = 1;   ///< share of W's variance
+  double offset_alone = 0;  ///< with a scale of 1
+  /// Unexplained where the scale is 1, where the offset is 0, and both.
+  double without_scale = 1, without_offset = 1, without_both = 1;
 };
 
 /// Of pairs w, f; W that is constant is explained by nothing.

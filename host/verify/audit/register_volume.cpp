@@ -42,7 +42,6 @@ class Fitter {
   [[nodiscard]] bool is_constant() const {
     return *std::min_element(w_.begin(), w_.end()) == *std::max_element(w_.begin(), w_.end());
   }
-  [[nodiscard]] double spread() const { return std::sqrt(variance(w_)); }
 
   /// Gauss and Newton's steps in the shift and, where asked, the centre, from where they are; a step that
   /// explains less is halved. F is linear in neither, so differences over a tenth of a sample take the place
@@ -108,13 +107,6 @@ class Fitter {
   }
 
  private:
-  static double variance(const std::vector<double>& v) {
-    double mean = 0, sum = 0;
-    for (const double x : v) mean += x / static_cast<double>(v.size());
-    for (const double x : v) sum += (x - mean) * (x - mean);
-    return sum / static_cast<double>(v.size());
-  }
-
   static double& parameter(FitSettings& s, int p) { return p < 3 ? s.shift[at(p)] : s.center; }
 
   std::vector<double> field(const FitSettings& s) {
@@ -280,7 +272,7 @@ Registration register_volume(Device& device, const ProjectionSet& scan, const Vo
     r.scale = 1;
     r.offset = 0;
     r.words.clear();
-    name_faults(r, linear, fitter.spread(), scan, options.field);
+    name_faults(r, linear, scan, options.field);
   }
   return r;
 }

@@ -10,8 +10,8 @@
 namespace vdvr {
 namespace {
 
-// Shares: programs whose filters and weights are right agree with each other to less.
-constexpr double kLeastFactor = 0.01, kLeastOffset = 0.02;
+// Of 1: programs that are right agree to less.
+constexpr double kLeastFactor = 0.01;
 
 std::string samples_off(double d) {
   const double size = std::abs(d), halves = std::round(2 * size) / 2;
@@ -38,17 +38,21 @@ bool earns_its_keep(double without, double with) {
   return without > 2 * with && without - with > kNegligible;
 }
 
-void name_faults(Registration& r, const LinearFit& linear, double spread, const ProjectionSet& scan,
+void name_faults(Registration& r, const LinearFit& linear, const ProjectionSet& scan,
                  const FieldOptions& field) {
   if (const std::string turned = words_of({r.axes, r.mirrored}); !turned.empty()) r.words.push_back(turned);
   // Of what F explains nothing of, a factor says nothing.
   const bool related = linear.unexplained < 0.5;
-  if (related && std::abs(linear.scale - 1) > kLeastFactor) {
+  // What is blurred fits best with less than F, and is not off by a factor for it: either must explain as
+  // much as other faults.
+  if (related && std::abs(linear.scale - 1) > kLeastFactor &&
+      earns_its_keep(linear.without_scale, linear.unexplained)) {
     r.scale = linear.scale;
     r.words.push_back(factor_words(linear.scale, scan.geometry.pitch_u));
   }
-  if (related && std::abs(linear.offset) > kLeastOffset * spread) {
-    r.offset = linear.offset;
+  if (related && (r.scale != 1 ? earns_its_keep(linear.without_offset, linear.unexplained)
+                               : earns_its_keep(linear.without_both, linear.without_scale))) {
+    r.offset = r.scale != 1 ? linear.offset : linear.offset_alone;
     r.words.push_back(fmt::format("an offset: {:+.4g} on all densities", linear.offset));
   }
   constexpr std::array<const char*, 3> names{"x", "y", "z"};

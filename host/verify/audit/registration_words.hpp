@@ -14,8 +14,8 @@ constexpr double kLeastShift = 0.05;
 /// Whether what was found explains so much more that it is named: half of what is unexplained without it.
 bool earns_its_keep(double without, double with);
 
-/// Sets scale and offset where they count, and the words. `spread`: standard deviation of W.
-void name_faults(Registration& registration, const LinearFit& linear, double spread,
-                 const ProjectionSet& scan, const FieldOptions& field);
+/// Sets scale and offset where they count, and the words.
+void name_faults(Registration& registration, const LinearFit& linear, const ProjectionSet& scan,
+                 const FieldOptions& field);
 
 }  // namespace vdvr

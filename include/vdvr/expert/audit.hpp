@@ -83,6 +83,22 @@ struct Audit {
   Grid registered_grid;                      ///< and the grid that W then has
 };
 
+/// Where a volume's samples lie, in the scan's unit; what is not said is the file's.
+struct PlaceOptions {
+  std::optional<Vec3> spacing;
+  std::optional<Vec3> origin;  ///< of the first sample
+};
+struct PlacedVolume {
+  Volume volume;
+  std::string spacing_from, origin_from;  ///< "option", "file", or what stands for it
+};
+/// A grid of one pixel's spacing, or whose first sample lies at 0, 0, 0, says nothing of either, as files
+/// without a place do: the spacing is then the detector's pitch at the axis, and the middle lies on the axis
+/// at the middle of what all views see. Metres, centimetres, millimetres and micrometres of a file become the
+/// scan's.
+VDVR_API PlacedVolume placed_volume(Volume volume, const ProjectionSet& scan, const FieldOptions& field,
+                                    const PlaceOptions& options);
+
 /// Puts W where `registration` says that it belongs.
 VDVR_API Volume registered_volume(const Volume& volume, const Registration& registration);
 
