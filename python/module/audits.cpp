@@ -44,6 +44,7 @@ nb::dict dict_of(const AuditFigures& f, Between between) {
 nb::dict dict_of(const Registration& r) {
   nb::dict d;
   d["found"] = r.words;
+  d["doubt"] = r.doubt;
   d["axes"] = r.axes;
   d["mirrored"] = r.mirrored;
   d["scale"] = r.scale;

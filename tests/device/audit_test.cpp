@@ -33,7 +33,8 @@ struct Case {
   ProjectionSet scan;
 };
 
-/// Half a turn without noise, of an odd detector; and one of even rows with noise of 2 % of the largest integral.
+/// Half a turn without noise, of an odd detector; and one of even rows with noise of 2 % of the largest
+/// integral.
 const std::vector<Case>& cases() {
   static const std::vector<Case> all = [] {
     std::vector<Case> list{{"lopsided", simulated(lopsided(17), 37, 37, 48)},
@@ -137,6 +138,15 @@ BOOST_AUTO_TEST_CASE(several_faults_at_once_are_named) {
   v.grid.origin[0] += 1.3;
   for (float& s : v.samples) s *= 0.5f;
   check_names(c, v, {"mirrored along y", "densities 2 times too small", "1.30 samples off towards larger x"});
+}
+
+BOOST_AUTO_TEST_CASE(a_volume_of_something_else_is_doubted_and_nothing_is_named) {
+  const Case& c = cases().front();
+  Volume other = made(noise_scan(48, 37, 37, 9));
+  const Registration r = found(c.scan, other);
+  BOOST_TEST(r.words.empty(), all(r));
+  BOOST_TEST(r.doubt.find("is it of this scan") != std::string::npos);
+  BOOST_TEST(found(c.scan, made(c.scan)).doubt.empty());
 }
 
 BOOST_AUTO_TEST_CASE(what_is_put_right_is_what_it_was) {

@@ -69,6 +69,7 @@ Json figures_json(const AuditFigures& f, Between between) {
 
 Json registration_json(const Registration& r) {
   return {{"found", r.words},
+          {"doubt", r.doubt},
           {"axes", r.axes},
           {"mirrored", r.mirrored},
           {"scale", r.scale},
@@ -98,7 +99,8 @@ void print_figures(const AuditFigures& f, Between between) {
 void print_audit(const Audit& a, const AuditOptions& options) {
   if (a.registration) {
     const Registration& r = *a.registration;
-    if (r.words.empty())
+    if (!r.doubt.empty()) fmt::print("registered     {}\n", r.doubt);
+    else if (r.words.empty())
       fmt::print("registered     nothing is off: turns, factor, shift, centre and window fit\n");
     for (std::size_t i = 0; i < r.words.size(); ++i)
       fmt::print("{:<15}{}\n", i == 0 ? "registered" : "", r.words[i]);

@@ -272,6 +272,7 @@ Registration register_volume(Device& device, const ProjectionSet& scan, const Vo
     r.scale = 1;
     r.offset = 0;
     r.words.clear();
+    r.doubt.clear();
     name_faults(r, linear, scan, options.field);
   }
   return r;

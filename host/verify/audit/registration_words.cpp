@@ -40,18 +40,28 @@ bool earns_its_keep(double without, double with) {
 
 void name_faults(Registration& r, const LinearFit& linear, const ProjectionSet& scan,
                  const FieldOptions& field) {
+  // Where F explains little however W is turned, no turn and no factor says anything.
+  if (linear.unexplained > 0.5) {
+    Registration plain;
+    plain.window = field.filter;
+    plain.unexplained = plain.unexplained_registered = r.unexplained;
+    plain.doubt = fmt::format(
+        "F explains {:.0f} % of the volume's variance at most, however it is turned and moved: is it of this "
+        "scan, on "
+        "this grid?",
+        100 * (1 - linear.unexplained));
+    r = plain;
+    return;
+  }
   if (const std::string turned = words_of({r.axes, r.mirrored}); !turned.empty()) r.words.push_back(turned);
-  // Of what F explains nothing of, a factor says nothing.
-  const bool related = linear.unexplained < 0.5;
   // What is blurred fits best with less than F, and is not off by a factor for it: either must explain as
   // much as other faults.
-  if (related && std::abs(linear.scale - 1) > kLeastFactor &&
-      earns_its_keep(linear.without_scale, linear.unexplained)) {
+  if (std::abs(linear.scale - 1) > kLeastFactor && earns_its_keep(linear.without_scale, linear.unexplained)) {
     r.scale = linear.scale;
     r.words.push_back(factor_words(linear.scale, scan.geometry.pitch_u));
   }
-  if (related && (r.scale != 1 ? earns_its_keep(linear.without_offset, linear.unexplained)
-                               : earns_its_keep(linear.without_both, linear.without_scale))) {
+  if ((r.scale != 1 ? earns_its_keep(linear.without_offset, linear.unexplained)
+                    : earns_its_keep(linear.without_both, linear.without_scale))) {
     r.offset = r.scale != 1 ? linear.offset : linear.offset_alone;
     r.words.push_back(fmt::format("an offset: {:+.4g} on all densities", linear.offset));
   }
@@ -66,10 +76,6 @@ void name_faults(Registration& r, const LinearFit& linear, const ProjectionSet& 
   if (r.window != field.filter)
     r.words.push_back(
         fmt::format("another window: {} fits better than {}", text_of(r.window), text_of(field.filter)));
-  if (!related)
-    r.words.push_back(fmt::format(
-        "F explains {:.0f} % of the volume's variance and no more: is it of this scan, on this grid?",
-        100 * (1 - linear.unexplained)));
 }
 
 }  // namespace vdvr

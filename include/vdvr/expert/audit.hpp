@@ -74,6 +74,7 @@ struct Registration {
   double unexplained = 0, unexplained_registered = 0;
   /// A line for each thing that is off, as people say it. Only what is named here is put right.
   std::vector<std::string> words;
+  std::string doubt;  ///< where W and F have little in common: nothing is named then
 };
 
 struct Audit {
