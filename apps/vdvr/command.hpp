@@ -21,6 +21,7 @@ int verify_command(Arguments& args);
 int probe_command(Arguments& args);
 int residual_command(Arguments& args);
 int measure_command(Arguments& args);
+int audit_command(Arguments& args);
 int render_command(Arguments& args);
 int export_command(Arguments& args);
 int convert_geometry_command(Arguments& args);

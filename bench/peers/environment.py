@@ -14,6 +14,8 @@ PACKAGES = {
     "astra": ["numpy", "astra-toolbox"],
     "silx": ["numpy", "pyopencl", "silx"],
     "rtk": ["numpy", "itk-rtk"],
+    "skimage": ["numpy", "scikit-image"],
+    "tomopy": ["numpy", "tomopy"],
     "h5py": ["numpy", "h5py"],  # reads our scans
     "zfp": ["numpy", "numba", "h5py", "zfpy"],
     "sz3": ["numpy", "pysz"],

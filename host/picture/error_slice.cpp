@@ -207,7 +207,9 @@ ErrorSlice error_slice(Device& device, const ProjectionSet& scan, const MixedVol
                        const Certificate& certificate, const ErrorSliceOptions& options,
                        const Progress& progress) {
   require_trusted(device, "measuring against F");
-  const SliceFrame frame = frame_of(volume.grid, options, certificate.epsilon_abs);
+  SliceFrame frame = frame_of(volume.grid, options, certificate.epsilon_abs);
+  const std::string difference = fmt::format("|{} − F|", options.volume);
+  frame.quantity = difference;
   const SlicePlace place = place_of(frame, options);
   const PixelGrid pixels = pixel_grid(volume.grid, options, place);
   const ReconstructOptions exact{certificate.field, 16,
@@ -216,9 +218,9 @@ ErrorSlice error_slice(Device& device, const ProjectionSet& scan, const MixedVol
   ErrorSlice result = empty_slice(place);
   compare(result, pixels, axes_of(options.axis), f, scan, volume, certificate);
   put_in_frame(result, frame, place, options,
-               fmt::format("Largest |V − F| here = {} = {:.1f} % of epsilon", number(result.max_error),
-                           100 * result.max_error / certificate.epsilon_abs),
-               "Grey: not compared. Cyan: above epsilon, the end of the scale.");
+               fmt::format("Largest {} here = {} = {:.1f} % of {}", difference, number(result.max_error),
+                           100 * result.max_error / certificate.epsilon_abs, options.end),
+               fmt::format("Grey: not compared. Cyan: above {}, the end of the scale.", options.end));
   return result;
 }
 

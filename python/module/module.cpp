@@ -17,4 +17,5 @@ NB_MODULE(_core, m) {
   vdvr::python::add_files(m);
   vdvr::python::add_program(m);
   vdvr::python::add_measures(m);
+  vdvr::python::add_audits(m);
 }

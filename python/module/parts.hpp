@@ -14,5 +14,6 @@ void add_viewers(nanobind::module_& m);
 void add_files(nanobind::module_& m);
 void add_program(nanobind::module_& m);
 void add_measures(nanobind::module_& m);
+void add_audits(nanobind::module_& m);
 
 }  // namespace vdvr::python

@@ -29,6 +29,7 @@ from ._core import (
     Verification,
     __version__,
 )
+from ._audit import audit
 from ._certify import build, plan, verify, verify_picture
 from ._devices import device, devices
 from ._scans import Scan, find_center, read_scan, recon
@@ -37,7 +38,7 @@ from ._volume import CertifiedPicture, Volume, open, transfer_presets
 __all__ = [
     "BuildError", "CenterEstimate", "CertifiedPicture", "DeviceError", "Error", "FileError", "Grid", "InputError",
     "MismatchError", "PictureVerification", "Plan", "ResourceError", "Scan", "ToleranceError", "TransferFunction",
-    "Verification", "Viewer", "Volume", "__version__", "build", "device", "devices", "find_center", "open", "plan",
+    "Verification", "Viewer", "Volume", "__version__", "audit", "build", "device", "devices", "find_center", "open", "plan",
     "read_scan", "recon", "transfer_presets", "verify", "verify_picture",
 ]
 

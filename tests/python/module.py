@@ -53,6 +53,13 @@ fine = vdvr.recon(tomo, theta)[1]
 print(f"recon() - iradon: at most {np.abs(fine - theirs)[inside].max():.3g} of {theirs.max():.3g}, "
       f"rms {np.sqrt(np.mean((fine - theirs)[inside]**2)):.3g}: iradon's interpolation")
 assert np.array_equal(vdvr.recon(tomo, theta, (columns - 1) / 2), vdvr.recon(tomo, theta))
+# Anybody's volume against F: iradon's rows count against our y.
+audited = vdvr.audit(np.stack([theirs, theirs]), vdvr.Scan(tomo, np.rad2deg(theta)))
+print(f"audit of iradon: {audited['registration']['found']}")
+assert audited["registration"]["found"][0] == "mirrored along y"  # its blur is a window's too
+figures = audited["registered"]
+assert figures["rms"] < figures["largest"] <= figures["lower"] <= figures["upper"] < audited["as_is"]["lower"]
+raises(vdvr.InputError, "none of nearest, linear, cubic", lambda: vdvr.audit(theirs, None, interpolate="sinc"))
 # The axis elsewhere: iradon has it in column n // 2 of n, so it gets the same rays with air beside them.
 off, wide = 24, 2 * 24 + 1
 aside = np.zeros((views, columns))

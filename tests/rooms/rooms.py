@@ -27,7 +27,7 @@ ROOMS = ["base/system", "base/opencl",
          "field/fbp", "field/fdk", "field/noise",
          "volume", "volume/sampler",
          "certify/bounds", "certify/kept", "certify/gold", "certify/crew", "certify/closing", "certify",
-         "verify/claims", "verify/witness", "verify", "verify/residual",
+         "verify/claims", "verify/witness", "verify", "verify/residual", "verify/audit",
          "picture/render", "picture/rays", "picture/refine", "picture", "picture/pixel", "picture/live",
          "measure", "measure/picture", "export"]
 MOST_ROOMS = 7

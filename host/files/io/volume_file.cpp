@@ -12,6 +12,7 @@
 
 #include "host/base/system/limits.hpp"
 #include "host/base/system/lower.hpp"
+#include "host/files/io/npy_file.hpp"
 #include "host/files/io/raster_file.hpp"
 #include "host/files/io/volume_samples.hpp"
 #include "host/files/io/volume_stack.hpp"
@@ -95,6 +96,26 @@ bool is_volume_input(const std::filesystem::path& path) {
   return is_volume_path(path) || is_tiff_path(path) || hdf5_volume_path(path) || is_tiff_folder(path);
 }
 
+namespace {
+
+Volume read_npy_volume(const std::filesystem::path& path, std::uint64_t max_memory_bytes,
+                       std::optional<double> nan_as) {
+  std::error_code unknown;
+  const std::uintmax_t bytes = std::filesystem::file_size(path, unknown);
+  // As doubles, beside the samples.
+  if (!unknown) io::require_memory(3 * bytes, max_memory_bytes, path.string());
+  const io::NpyArray array = io::read_npy(path);
+  if (array.shape.size() != 3)
+    throw FileError(fmt::format("{}: a volume has three axes, z, y and x; this array has {}", path.string(),
+                                array.shape.size()));
+  io::VolumeSamples samples(path.string(), {array.shape[2], array.shape[1], array.shape[0]}, max_memory_bytes,
+                            nan_as);
+  samples.append(array.values);
+  return samples.take();
+}
+
+}  // namespace
+
 std::filesystem::path file_of_volume(const std::filesystem::path& path) {
   const auto parts = hdf5_volume_path(path);
   return parts ? parts->first : path;
@@ -110,9 +131,10 @@ Volume read_volume(const std::filesystem::path& path, std::uint64_t max_memory_b
   const VolumeLimits limits{max_memory_bytes, nan_as};
   if (const auto parts = hdf5_volume_path(path)) return read_hdf5_volume(parts->first, parts->second, limits);
   if (is_tiff_path(path) || is_tiff_folder(path)) return read_tiff_volume(path, limits);
+  if (lower_extension(path) == ".npy") return read_npy_volume(path, max_memory_bytes, nan_as);
   if (!is_volume_path(path))
     throw FileError(fmt::format(
-        "{}: not a volume by its name (.mha, .mhd, .nrrd, .nhdr, .tif, FILE.h5:/dataset, a folder "
+        "{}: not a volume by its name (.mha, .mhd, .nrrd, .nhdr, .tif, .npy, FILE.h5:/dataset, a folder "
         "of TIFF slices)",
         path.string()));
   io::RasterSamples source(io::read_raster_header(path), max_memory_bytes);

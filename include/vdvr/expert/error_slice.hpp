@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "vdvr/api.hpp"
@@ -37,6 +38,8 @@ struct ErrorSliceOptions {
   std::int64_t width = 512, height = 512;  ///< of the picture
   /// With axes, colour bar and caption (slice_frame.hpp) where there is room; else the slice is all of it.
   bool framed = true;
+  /// Of error_slice(), what the words call the volume, and the end of its colours.
+  std::string volume = "V", end = "epsilon";
 };
 
 /// Height of the caption below bound_picture(), in pixels.
