@@ -14,7 +14,7 @@ namespace vdvr::cli {
 namespace {
 
 // Rows of the table in the report.
-constexpr std::size_t most_rows = 12;
+constexpr std::size_t most_reported = 12;
 
 Interval in_percent(const Interval& i) { return {100 * i.lo, 100 * i.hi}; }
 
@@ -88,7 +88,7 @@ std::string measured_section(const MeasuredByRun& m, const std::string& unit) {
        {"separate places that can hold any", count_html(static_cast<std::uint64_t>(m.components.possible))}});
   if (!m.components.rows.empty())
     html += table_head({"place", "volume", "holds any", "spans x", "spans y", "spans z"});
-  for (std::size_t i = 0; i < std::min(most_rows, m.components.rows.size()); ++i) {
+  for (std::size_t i = 0; i < std::min(most_reported, m.components.rows.size()); ++i) {
     const MeasuredComponent& c = m.components.rows[i];
     html += table_row(std::to_string(i + 1), {escaped(interval_text(c.volume, cubed)), held(c),
                                               text_of(c.spans[0]), text_of(c.spans[1]), text_of(c.spans[2])});

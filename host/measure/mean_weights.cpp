@@ -51,7 +51,7 @@ void add(double factor, const double* from, std::int64_t n, double* to) {
 
 double volume_by_lines(const MeasuredRegion& region) {
   std::array<std::vector<double>, 2> middle, length;
-  for (const std::size_t a : {1, 2}) {
+  for (const std::size_t a : {1UL, 2UL}) {
     const std::vector<double> faces = region.faces(a);
     const double step = (faces.back() - faces.front()) / places_across;
     for (std::size_t i = 0; i + 1 < faces.size(); ++i)
