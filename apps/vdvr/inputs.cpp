@@ -197,11 +197,9 @@ ProjectionSet load_as_stated(const fs::path& path, const Arguments& args, const 
   // Folders say it themselves; no other file is of cone beam.
   const bool bare = fs::is_regular_file(path, error) && path.filename() != "scan.json";
   Understood understood;
-  ProjectionSet scan =
-      checked(load(path, args, recorded,
-                   geometry && geometry->cone && bare ? std::optional(Beam::cone) : std::nullopt, stored,
-                   progress, understood),
-              path);
+  ProjectionSet scan = load(path, args, recorded,
+                            geometry && geometry->cone && bare ? std::optional(Beam::cone) : std::nullopt,
+                            stored, progress, understood);
   if (understood.stated != stored)
     throw MismatchError(fmt::format("{}: options state of the input: {}; the volume was built with: {}",
                                     path.string(), text_of(understood.stated), text_of(stored)));
@@ -212,7 +210,7 @@ ProjectionSet load_as_stated(const fs::path& path, const Arguments& args, const 
 
 ProjectionSet load_certified_scan(const fs::path& path, const Arguments& args, const Certificate& certificate,
                                   const Progress& progress) {
-  return load_as_stated(path, args, certificate, certificate.field, progress);
+  return checked(load_as_stated(path, args, certificate, certificate.field, progress), path);
 }
 
 ProjectionSet load_scan_to_verify(const fs::path& path, const Arguments& args, const Certificate& certificate,

@@ -301,9 +301,9 @@ inline void draw_shifts(std::uint64_t seed, ParallelGeometry& g, std::string& na
       std::string(", shifted") + (along_columns ? " along columns" : "") + (along_rows ? " along rows" : "");
 }
 
-inline void draw_scan(std::uint64_t seed, Random& random, Case& c) {
+inline void draw_scan(std::uint64_t of_shifts, Random& random, Case& c) {
   ParallelGeometry g = draw_geometry(random, c.name);
-  draw_shifts(seed, g, c.name);
+  draw_shifts(of_shifts, g, c.name);
   const auto seed = static_cast<unsigned>(random());
   switch (std::uniform_int_distribution<int>(0, 9)(random)) {
     case 0:
