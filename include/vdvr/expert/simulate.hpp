@@ -113,7 +113,8 @@ struct SimulateOptions {
 };
 
 /// Shifts of so many views from a text file: a number a view, or two (columns, rows). Throws FileError.
-VDVR_API std::vector<std::array<double, 2>> read_shifts(const std::filesystem::path& path, std::int64_t views);
+VDVR_API std::vector<std::array<double, 2>> read_shifts(const std::filesystem::path& path,
+                                                        std::int64_t views);
 
 /// Views at k * arc / angles. Cost: angles * rows * columns (* binning^2, * 16 band-limited, *
 /// supersampling^2, or ^4 with a focal spot) line integrals
