@@ -8,6 +8,9 @@ namespace {
 
 const std::set<std::string>& fields_with_options() {
   static const std::set<std::string> names{"angle_unit",
+                                           "beam_current",
+                                           "flats_in_time",
+                                           "shifts",
                                            "angles_file",
                                            "azimuth",
                                            "base",

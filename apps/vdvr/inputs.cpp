@@ -7,6 +7,7 @@
 #include "apps/vdvr/crew.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/certify.hpp"
+#include "vdvr/expert/preparation.hpp"
 #include "vdvr/expert/reconstruct.hpp"
 #include "vdvr/expert/rows_to_verify.hpp"
 #include "vdvr/expert/volume_file.hpp"
@@ -40,12 +41,20 @@ void add_scan(Arguments& args) {
       .value("angles-file", "FILE",
              "for stacks and HDF5 files: angles, one per view; degrees, unless --angle-unit says otherwise")
       .value("angle-unit", "degrees|radians", "of the angles, whatever the file of them says")
+      .value("shifts", "none|FILE",
+             "how far the sample stood in each view towards higher columns [and rows], in the unit of the "
+             "pitch: "
+             "numbers, or FILE.h5:/dataset; none: it stood still")
       .value("beam", "cone|parallel",
              "cone: by the distances of an NXtomo file, which is read as parallel beam otherwise")
       .value("entry", "NAME", "the group of an HDF5 file that holds the scan, where there are several")
       .value("views", "RANGES", "the projections used, half-open ranges counted from 0: 0:40,41:90")
       .value("darks", "none|LEVEL", "counts without beam, in place of darks; none: 0")
       .value("flats", "none|LEVEL", "counts of the open beam, in place of flats; none: 1")
+      .value("beam-current", "none|DATASET",
+             "of an HDF5 file: the beam's current in each frame, by which frames are divided; none: they are "
+             "not "
+             "(default: where the file has it)")
       .flag("transmission", "values are transmissions: normalised by flats and darks, without -log")
       .flag("line-integrals", "values are line integrals: normalised, and -log was taken")
       .flag("follow-links",
@@ -63,6 +72,7 @@ InputStatement input_statement(const Arguments& args, const InputStatement& stor
                     args.text("views")));
   if (const auto dark = level(args, "darks", 0)) s.dark = dark;
   if (const auto flat = level(args, "flats", 1)) s.flat = flat;
+  if (args.has("beam-current")) s.beam_current = args.text("beam-current");
   if (args.has("transmission") && args.has("line-integrals"))
     throw InputError("--transmission and --line-integrals exclude each other");
   if (args.has("transmission")) s.values = SampleValues::transmission;
@@ -128,6 +138,7 @@ ScanOptions scan_options(const Arguments& args, const FieldOptions& field, std::
   if (args.has("angles-file")) options.angles_file = args.path("angles-file");
   options.beam = args.has("beam") ? beam_of(args.choice("beam", "parallel")) : beam;
   options.center = field.center;
+  if (args.has("shifts")) options.shifts = args.text("shifts");
   options.preparation = field.preparation;
   options.input = input_statement(args, stored);
   options.follow_links = args.has("follow-links");
@@ -179,6 +190,8 @@ namespace {
 ProjectionSet load_as_stated(const fs::path& path, const Arguments& args, const Certificate& certificate,
                              const FieldOptions& field, const Progress& progress,
                              Understood* understood_there = nullptr) {
+  FieldOptions recorded = field;
+  recorded.preparation = as_recorded(field.preparation);
   const auto geometry = noted_geometry(certificate);
   const InputStatement stored = noted_input(certificate);
   std::error_code error;
@@ -186,10 +199,9 @@ ProjectionSet load_as_stated(const fs::path& path, const Arguments& args, const 
   const bool bare = fs::is_regular_file(path, error) && path.filename() != "scan.json";
   Understood own;
   Understood& understood = understood_there ? *understood_there : own;
-  ProjectionSet scan = checked(
-      load(path, args, field, geometry && geometry->cone && bare ? std::optional(Beam::cone) : std::nullopt,
-           stored, progress, understood),
-      path);
+  ProjectionSet scan = load(path, args, recorded,
+                            geometry && geometry->cone && bare ? std::optional(Beam::cone) : std::nullopt,
+                            stored, progress, understood);
   if (understood.stated != stored)
     throw MismatchError(fmt::format("{}: options state of the input: {}; the volume was built with: {}",
                                     path.string(), text_of(understood.stated), text_of(stored)));
@@ -200,7 +212,7 @@ ProjectionSet load_as_stated(const fs::path& path, const Arguments& args, const 
 
 ProjectionSet load_certified_scan(const fs::path& path, const Arguments& args, const Certificate& certificate,
                                   const Progress& progress, Understood* understood) {
-  return load_as_stated(path, args, certificate, certificate.field, progress, understood);
+  return checked(load_as_stated(path, args, certificate, certificate.field, progress, understood), path);
 }
 
 ProjectionSet load_scan_to_verify(const fs::path& path, const Arguments& args, const Certificate& certificate,
@@ -208,6 +220,7 @@ ProjectionSet load_scan_to_verify(const fs::path& path, const Arguments& args, c
   FieldOptions measured = certificate.field;
   measured.preparation.half_acquisition = false;
   measured.preparation.padding = Padding::none;
+  measured.preparation.common_heights = false;
   return checked(
       rows_to_verify(load_as_stated(path, args, certificate, measured, progress), certificate.field), path);
 }

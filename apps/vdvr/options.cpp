@@ -43,6 +43,10 @@ void add_field(Arguments& args) {
       .value("filter", fmt::format("{}", fmt::join(filter_names(), "|")), "default ram-lak")
       .value("filter-cutoff", "F", "fraction of the detector's Nyquist frequency, in (0, 1] (default 1)");
   args.group("Preparation (F is that of the prepared projections)")
+      .value(
+          "flats-in-time", "auto|on|off",
+          "projections are divided by what lies between the flats before and after them; off: by the mean of "
+          "all flats (default auto: on where the order of frames is known)")
       .value("outliers", "T[,N]",
              "pixels brighter than the median of N x N by T of the open beam become it (N: 3)")
       .value("phase", "MM,KEV,RATIO",
@@ -61,8 +65,9 @@ void add_field(Arguments& args) {
 
 namespace {
 
-const std::vector<std::string> preparation_names{"outliers", "phase",   "stripes",          "median",
-                                                 "gaussian", "binning", "half-acquisition", "pad"};
+const std::vector<std::string> preparation_names{"outliers",         "phase",    "stripes",
+                                                 "median",           "gaussian", "binning",
+                                                 "half-acquisition", "pad",      "flats-in-time"};
 
 // `count` numbers, or the first alone where `fewest` is 1.
 std::vector<double> list_of(const Arguments& args, const std::string& name, std::size_t fewest,
@@ -111,6 +116,8 @@ Preparation preparation_options(const Arguments& args) {
   const std::string half = args.choice("half-acquisition", "auto");
   if (half != "auto") p.half_acquisition = half == "on";
   p.padding = padding_of(args.choice("pad", "none")).value();
+  const std::string flats = args.choice("flats-in-time", "auto");
+  if (flats != "auto") p.flats_in_time = flats == "on";
   check_preparation(p);
   return p;
 }

@@ -31,6 +31,8 @@ void update(Sha256& sha, const std::vector<T>& values) {
 std::string plan_digest(const ProjectionSet& scan, const Plan& plan) {
   Sha256 sha;
   update(sha, scan.geometry.theta_rad);
+  update(sha, scan.geometry.column_shift);
+  update(sha, scan.geometry.row_shift);
   if (scan.cone) update(sha, scan.cone->views);
   update(sha, plan.base.samples);
   return sha.hex();

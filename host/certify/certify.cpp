@@ -87,6 +87,8 @@ std::string options_json(const Plan& plan, const CertifyOptions& options, const 
                    {"center", center_of(plan.field, geometry)},
                    {"unit", geometry.unit},
                    {"theta_rad", geometry.theta_rad}};
+  if (!geometry.column_shift.empty()) j["geometry"]["column_shift"] = geometry.column_shift;
+  if (!geometry.row_shift.empty()) j["geometry"]["row_shift"] = geometry.row_shift;
   if (const RowExtension& e = geometry.extension; e.before > 0 || e.after > 0)
     j["geometry"]["extension"] = {{"half_acquisition", e.half_acquisition.value_or(false)},
                                   {"pad", text_of(e.padding)},

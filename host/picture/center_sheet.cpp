@@ -63,6 +63,10 @@ std::int64_t opposite_of(const ParallelGeometry& g, double theta) {
          g.theta_rad.begin();
 }
 
+double shift_of(const ParallelGeometry& g, std::int64_t view) {
+  return g.column_shift.empty() ? 0 : g.column_shift[static_cast<std::size_t>(view)];
+}
+
 // Of the columns that opposite views both see: squares of the difference over those of the views.
 double mismatch(const ProjectionSet& row, double center) {
   const ParallelGeometry& g = row.geometry;
@@ -73,8 +77,8 @@ double mismatch(const ProjectionSet& row, double center) {
     const std::int64_t opposite = opposite_of(g, g.theta_rad[static_cast<std::size_t>(k)]);
     const float *own = row.data.data() + k * g.columns, *other = row.data.data() + opposite * g.columns;
     for (std::int64_t t = -reach; t <= reach; ++t) {
-      const double a = linear_at(own, g.columns, center + static_cast<double>(t)),
-                   b = linear_at(other, g.columns, center - static_cast<double>(t));
+      const double a = linear_at(own, g.columns, center + shift_of(g, k) + static_cast<double>(t)),
+                   b = linear_at(other, g.columns, center + shift_of(g, opposite) - static_cast<double>(t));
       apart += (a - b) * (a - b);
       both += a * a + b * b;
     }

@@ -17,6 +17,7 @@ nlohmann::json json_of(const InputStatement& s) {
   if (s.flat) json["flat"] = *s.flat;
   if (s.values) json["values"] = text_of(*s.values);
   if (s.angle_unit) json["angle_unit"] = text_of(*s.angle_unit);
+  if (!s.beam_current.empty()) json["beam_current"] = s.beam_current;
   return json;
 }
 
@@ -38,6 +39,8 @@ InputStatement input_statement_of(const nlohmann::json& json) {
           throw InputError("input: 'views' must be a list of [first, last]");
         s.views.emplace_back(range[0].get<std::int64_t>(), range[1].get<std::int64_t>());
       }
+    } else if (name == "beam_current" && value.is_string()) {
+      s.beam_current = value.get<std::string>();
     } else if (name == "dark") {
       s.dark = level(name, value);
     } else if (name == "flat") {

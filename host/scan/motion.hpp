@@ -1,16 +1,23 @@
-// Whether the sample stood still. Called once views are chosen and lengths known.
+// Where the sample stood in each view. Called once views are chosen and lengths known.
 #pragma once
 
 #include <string>
 
 #include "host/scan/raw/raw_scan.hpp"
+#include "vdvr/expert/projections.hpp"
 
 namespace vdvr::io {
 
-/// Throws FileError where the sample moves, along an axis, by more than a quarter of a pixel in all: F is
-/// that of a sample which turns and does nothing else. Were positions spread evenly over that, they would
-/// add (1/4)^2 / 12 to the variance of a pixel's aperture, 1/12: it widens by 3 %, and a centre of rotation
-/// is not known better either (docs/inputs.md). `pitch`: sides of a pixel at the axis, in the scan's unit.
-void require_still(const RawScan& scan, double pitch, const std::string& name);
+/// ". The longest part at rest is `views` 0:40", by positions along z; nothing where there is none. `pitch`:
+/// of rows.
+std::string part_at_rest(const RawScan& scan, double pitch);
+
+/// Fills shifts of the geometry from what is stated, else from the file's positions along x and z, relative
+/// to the first view; the words that say so go into the scan's notes or warnings. Positions within a quarter
+/// of a pixel in all are those of a sample that stands still: were they spread evenly over that, they would
+/// add (1/4)^2 / 12 to the variance of a pixel's aperture, 1/12, which widens it by 3 % (docs/inputs.md).
+/// Throws FileError for positions along y, and all of cone beam, that move by more; and where the size of a
+/// pixel is not known in their unit.
+void set_shifts(RawScan& scan, const std::string& name, ParallelGeometry& geometry);
 
 }  // namespace vdvr::io

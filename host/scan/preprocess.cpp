@@ -108,10 +108,15 @@ FlatField make_flat_field(const io::Frames& flats, const io::Frames& darks, std:
 
 std::int64_t to_line_integrals(std::span<double> counts, std::int64_t rows, std::int64_t columns,
                                const FlatField& field) {
+  return to_line_integrals(counts, rows, columns, field, field.gain);
+}
+
+std::int64_t to_line_integrals(std::span<double> counts, std::int64_t rows, std::int64_t columns,
+                               const FlatField& field, std::span<const double> gain) {
   std::vector<bool> dead(counts.size());
   std::int64_t replaced = 0;
   for (std::size_t i = 0; i < counts.size(); ++i) {
-    const double transmission = (counts[i] - field.dark[i]) / field.gain[i];
+    const double transmission = (counts[i] - field.dark[i]) / gain[i];
     dead[i] = !(transmission > field.floor) || !std::isfinite(transmission);
     counts[i] = dead[i] ? nan : -std::log(transmission);
     replaced += dead[i] ? 1 : 0;

@@ -32,6 +32,9 @@ FlatField make_flat_field(const io::Frames& flats, const io::Frames& darks, std:
 /// that has any. Of a projection without one, all pixels count, and are left NaN.
 std::int64_t to_line_integrals(std::span<double> counts, std::int64_t rows, std::int64_t columns,
                                const FlatField& field);
+/// The same with a gain of this projection's own in place of the field's.
+std::int64_t to_line_integrals(std::span<double> counts, std::int64_t rows, std::int64_t columns,
+                               const FlatField& field, std::span<const double> gain);
 
 /// Subtracts from each row the least-squares line through its samples in the (inclusive) column ranges.
 void subtract_air_background(std::span<double> view, std::int64_t rows, std::int64_t columns,

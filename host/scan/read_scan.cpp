@@ -14,9 +14,11 @@
 #include "host/base/system/limits.hpp"
 #include "host/base/system/read_in_child.hpp"
 #include "host/scan/cone_scan.hpp"
+#include "host/scan/flats_in_time.hpp"
 #include "host/scan/motion.hpp"
 #include "host/scan/open/open_scan.hpp"
 #include "host/scan/photon_transfer.hpp"
+#include "host/scan/prepare/common_heights.hpp"
 #include "host/scan/prepare/prepare.hpp"
 #include "host/scan/preprocess.hpp"
 #include "host/scan/scan_report.hpp"
@@ -75,7 +77,7 @@ std::int64_t block_views(const io::RawScan& raw, std::uint64_t max_memory_bytes)
 }
 
 void require_room(const io::RawScan& raw, const ScanOptions& options, const std::string& name,
-                  std::uint64_t preparation_bytes = 0) {
+                  std::uint64_t preparation_bytes = 0, std::uint64_t flats_bytes = 0) {
   const std::array<std::int64_t, 3> all{raw.projections.count, raw.rows, raw.columns};
   const std::array<std::int64_t, 3> block{block_views(raw, options.max_memory_bytes), raw.rows, raw.columns};
   const std::uint64_t samples = io::checked_bytes(all, sizeof(float), name),
@@ -84,7 +86,7 @@ void require_room(const io::RawScan& raw, const ScanOptions& options, const std:
                                      : std::min(samples, options.max_memory_bytes / 8);
   const std::uint64_t cores = std::max(1u, std::thread::hardware_concurrency());
   io::require_memory(
-      resident + 2 * io::checked_bytes(block, sizeof(double), name) + cores * preparation_bytes,
+      resident + 2 * io::checked_bytes(block, sizeof(double), name) + cores * preparation_bytes + flats_bytes,
       options.max_memory_bytes, name + ": the projections");
 }
 
@@ -114,7 +116,7 @@ void require_finite(std::span<const double> view, const io::RawScan& raw, std::i
 }
 
 void read_samples(const io::RawScan& raw, const ScanOptions& options, const ViewPreparation& preparation,
-                  ProjectionSet& scan, io::ValueTotals& totals, Understood& understood,
+                  FlatsInTime& in_time, ProjectionSet& scan, io::ValueTotals& totals, Understood& understood,
                   const Progress& progress) {
   const std::int64_t size = raw.rows * raw.columns, step = block_views(raw, options.max_memory_bytes);
   FlatField field;
@@ -135,13 +137,15 @@ void read_samples(const io::RawScan& raw, const ScanOptions& options, const View
   for (std::int64_t first = 0; first < raw.projections.count; first += step) {
     const std::int64_t n = std::min(step, raw.projections.count - first);
     raw.projections.read(first, n, block.data());
+    if (!in_time.none()) in_time.go_to(first, n, field.dark);
     for_each_view(n, [&](std::int64_t k) {
       const std::span<double> view(block.data() + k * size, static_cast<std::size_t>(size));
       io::ValueTotals& own = of_view[static_cast<std::size_t>(k)] = {};
       if (raw.counts) {
         if (full > 0) own.saturated = std::count(view.begin(), view.end(), full);
         std::int64_t& replaced = dead[static_cast<std::size_t>(k)] =
-            to_line_integrals(view, raw.rows, raw.columns, field);
+            in_time.none() ? to_line_integrals(view, raw.rows, raw.columns, field)
+                           : to_line_integrals(view, raw.rows, raw.columns, field, in_time.gain(first + k));
         if (replaced == size) return;
       } else {
         require_finite(view, raw, first + k);
@@ -269,6 +273,24 @@ void extend(const fs::path& path, const io::RawScan& raw, const ScanOptions& opt
   }
 }
 
+void bring_to_common_heights(const fs::path& path, const io::RawScan& raw, const ScanOptions& options,
+                             ProjectionSet& scan) {
+  try {
+    common_heights(scan, options.preparation, options.max_memory_bytes, options.scratch);
+  } catch (const InputError& e) {
+    throw FileError(path.string() + ": " + e.what() + io::part_at_rest(raw, scan.geometry.pitch_v));
+  }
+}
+
+FlatsInTime flats_in_time(const fs::path& path, const io::RawScan& raw, const ScanOptions& options) {
+  try {
+    return {raw, options.preparation};
+  } catch (InputError& e) {
+    e.add_context(path.string());
+    throw;
+  }
+}
+
 enum class Wanted { all, flats_and_darks };
 
 // What comes from the files, and nothing kept.
@@ -303,16 +325,18 @@ ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const
   ProjectionSet scan;
   scan.report.name = name_of(path, folder);
   scan.report.format = raw.format;
-  scan.report.notes = raw.notes;
   describe(raw, options, understood);
   scan.geometry = geometry_of(raw, path.string());
   const ViewPreparation preparation(options.preparation, scan.geometry, raw.cone.has_value());
   if (raw.cone) set_cone(path, raw, options, scan);
-  io::require_still(raw, std::min(scan.geometry.pitch_u, scan.geometry.pitch_v), path.string());
-  require_room(raw, options, path.string(), preparation.bytes());
+  io::set_shifts(raw, path.string(), scan.geometry);
+  scan.report.notes.insert(scan.report.notes.begin(), raw.notes.begin(), raw.notes.end());
+  FlatsInTime in_time = flats_in_time(path, raw, options);
+  require_room(raw, options, path.string(), preparation.bytes(),
+               in_time.bytes(block_views(raw, options.max_memory_bytes)));
   const auto before = stamps_of(raw);
   io::ValueTotals totals;
-  read_samples(raw, options, preparation, scan, totals, understood, progress);
+  read_samples(raw, options, preparation, in_time, scan, totals, understood, progress);
   const std::int64_t samples = scan.size();
   require_alive(raw, scan.report.dead_pixels, samples, path.string());
   io::judge_values(totals, raw, path.string());
@@ -333,7 +357,10 @@ ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const
   warnings.insert(warnings.begin(), raw.warnings.begin(), raw.warnings.end());
   scan.report.notes.insert(scan.report.notes.begin(), warnings.begin(), warnings.end());
   scan.report.preparation = for_columns(options.preparation, raw.columns);
+  for (std::string& words : in_time.record(scan.report.preparation))
+    scan.report.notes.push_back(std::move(words));
   prepare_scan(scan, scan.report.preparation, options.max_memory_bytes, progress);
+  bring_to_common_heights(path, raw, options, scan);
   if (!raw.cone) choose_center(path, raw, options, scan);
   extend(path, raw, options, scan, understood);
   return scan;

@@ -43,6 +43,15 @@ void write_geometry(io::hdf5::Writer& file, const ParallelGeometry& g) {
   file.attribute(kData, "pitch_u", g.pitch_u);
   file.attribute(kData, "pitch_v", g.pitch_v);
   file.attribute(kData, "center", g.center);
+  if (!g.column_shift.empty() || !g.row_shift.empty()) {
+    std::vector<double> shifts;  // [view][column, row], in the unit
+    for (std::size_t k = 0; k < g.theta_rad.size(); ++k) {
+      shifts.push_back(g.column_shift.empty() ? 0 : g.column_shift[k] * g.pitch_u);
+      shifts.push_back(g.row_shift.empty() ? 0 : g.row_shift[k] * g.pitch_v);
+    }
+    file.dataset("/exchange/shifts", {g.theta_rad.size(), 2}, std::span<const double>(shifts),
+                 {g.theta_rad.size(), 2});
+  }
   std::vector<double> theta_deg;
   for (const double t : g.theta_rad) theta_deg.push_back(t * (180 / std::numbers::pi));
   file.dataset("/exchange/theta", {theta_deg.size()}, std::span<const double>(theta_deg), {theta_deg.size()});
@@ -92,16 +101,73 @@ class Counter {
   const PhotonCounts& counts_;
 };
 
+// Places of frames in time, and the beam then.
+class Timeline {
+ public:
+  Timeline(const ParallelGeometry& g, const PhotonCounts& counts) : g_(g), counts_(counts) {
+    for (std::int64_t r = 0; r < counts.flat_runs; ++r) {
+      const double share =
+          counts.flat_runs == 1 ? 0 : static_cast<double>(r) / static_cast<double>(counts.flat_runs - 1);
+      const auto before = static_cast<std::int64_t>(std::round(share * static_cast<double>(g.views())));
+      for (std::int64_t f = 0; f < counts.flats; ++f) flats_after_.push_back(before);
+    }
+  }
+  [[nodiscard]] std::int64_t flats() const { return std::ssize(flats_after_); }
+  [[nodiscard]] std::vector<double> flats_after() const { return {flats_after_.begin(), flats_after_.end()}; }
+  // From 0 in the first to 1 in the last frame.
+  [[nodiscard]] double of_projection(std::int64_t k) const {
+    const auto before = std::upper_bound(flats_after_.begin(), flats_after_.end(), k) - flats_after_.begin();
+    return share(k + before);
+  }
+  [[nodiscard]] double of_flat(std::int64_t f) const { return share(flats_after_[at(f)] + f); }
+  [[nodiscard]] double current(double time) const { return 1 - counts_.beam_decay * time; }
+  // Photons expected in a pixel of the open beam.
+  [[nodiscard]] double open(double time, std::int64_t pixel) const {
+    if (counts_.flat_drift == 0 && counts_.beam_decay == 0) return counts_.photons;
+    const double x = 2 * static_cast<double>(pixel % g_.columns) /
+                         static_cast<double>(std::max<std::int64_t>(1, g_.columns - 1)) -
+                     1;
+    return counts_.photons * current(time) * (1 + counts_.flat_drift * time * x);
+  }
+
+ private:
+  [[nodiscard]] double share(std::int64_t frame) const {
+    return static_cast<double>(frame) /
+           static_cast<double>(std::max<std::int64_t>(1, g_.views() + flats() - 1));
+  }
+  const ParallelGeometry& g_;
+  const PhotonCounts& counts_;
+  std::vector<std::int64_t> flats_after_;  // by how many projections
+};
+
+void write_timeline(io::hdf5::Writer& file, const ParallelGeometry& g, const PhotonCounts& counts,
+                    const Timeline& time) {
+  if (counts.flat_runs > 1) {
+    const std::vector<double> places = time.flats_after();
+    file.dataset("/exchange/data_white_at", {places.size()}, std::span<const double>(places),
+                 {places.size()});
+  }
+  if (counts.beam_decay == 0) return;
+  std::vector<double> currents;
+  for (std::int64_t k = 0; k < g.views(); ++k) currents.push_back(time.current(time.of_projection(k)));
+  for (std::int64_t f = 0; f < time.flats(); ++f) currents.push_back(time.current(time.of_flat(f)));
+  file.dataset("/exchange/beam_current", {currents.size()}, std::span<const double>(currents),
+               {currents.size()});
+}
+
 template <class Count>
 void write_counts(io::hdf5::Writer& file, const ProjectionSet& scan, const PhotonCounts& counts) {
   const ParallelGeometry& g = scan.geometry;
   Counter<Count> counter(file, g, counts);
+  const Timeline time(g, counts);
   counter.write(kData, g.views(), 0, [&](std::int64_t k, std::int64_t pixel) {
-    return counts.photons * std::exp(-static_cast<double>(scan.data[at(k * g.rows * g.columns + pixel)]));
+    return time.open(time.of_projection(k), pixel) *
+           std::exp(-static_cast<double>(scan.data[at(k * g.rows * g.columns + pixel)]));
   });
-  counter.write("/exchange/data_white", counts.flats, 1,
-                [&](std::int64_t, std::int64_t) { return counts.photons; });
+  counter.write("/exchange/data_white", time.flats(), 1,
+                [&](std::int64_t f, std::int64_t pixel) { return time.open(time.of_flat(f), pixel); });
   counter.write("/exchange/data_dark", counts.darks, 2, [](std::int64_t, std::int64_t) { return 0.0; });
+  write_timeline(file, g, counts, time);
 }
 
 }  // namespace
@@ -130,11 +196,20 @@ void write_photon_counts(const fs::path& path, const ProjectionSet& scan, const 
     throw InputError(fmt::format(
         "{}: {} flats, {} darks, offset {}: counts need a flat, a dark, and an offset of 0 or more",
         path.string(), counts.flats, counts.darks, counts.offset));
+  if (counts.flat_runs < 1 || counts.flat_runs > scan.geometry.views() + 1)
+    throw InputError(fmt::format("{}: {} runs of flats; give 1 to {}, one more than views", path.string(),
+                                 counts.flat_runs, scan.geometry.views() + 1));
+  for (const double share : {counts.flat_drift, counts.beam_decay})
+    if (!(std::abs(share) < 1))
+      throw InputError(fmt::format("{}: the open beam changes by a share of {}; it must be below 1",
+                                   path.string(), share));
   io::AtomicFile target(path);
   io::hdf5::Writer file(target.temporary(), path, {.headers = io::hdf5::Headers::dated});
   file.group("/exchange");
   // Six standard deviations above the open beam.
-  const double largest = counts.offset + counts.photons + 6 * std::sqrt(counts.photons);
+  const double open = counts.photons * (1 + std::abs(counts.flat_drift)) *
+                      (1 + std::max(0.0, -counts.beam_decay)),
+               largest = counts.offset + open + 6 * std::sqrt(open);
   if (largest < static_cast<double>(std::numeric_limits<std::uint16_t>::max()))
     write_counts<std::uint16_t>(file, scan, counts);
   else write_counts<std::uint32_t>(file, scan, counts);

@@ -41,7 +41,15 @@ std::optional<ProjectionSet> noted_geometry(const Certificate& certificate) {
     geometry.center = g.at("center").get<double>();
     geometry.unit = g.at("unit").get<std::string>();
     geometry.theta_rad = g.at("theta_rad").get<std::vector<double>>();
+    for (auto [name, shift] :
+         {std::pair{"column_shift", &geometry.column_shift}, std::pair{"row_shift", &geometry.row_shift}}) {
+      if (!g.contains(name)) continue;
+      *shift = g.at(name).get<std::vector<double>>();
+      if (shift->size() != geometry.theta_rad.size())
+        throw FileError(fmt::format("certificate, options.geometry.{}: one number is needed a view", name));
+    }
     if (g.contains("extension")) geometry.extension = extension_of(g.at("extension"));
+    geometry.extension.common_heights = !geometry.row_shift.empty();
     if (g.contains("cone")) {
       const auto& cone = g.at("cone");
       const auto redundancy = redundancy_of(cone.at("redundancy").get<std::string>());

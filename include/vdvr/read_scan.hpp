@@ -40,6 +40,15 @@ struct PhotonCounts {
   std::uint64_t seed = 1;  ///< of Poisson's variates; the same on every machine
   std::int64_t flats = 10, darks = 10;
   int offset = 100;  ///< what the dark counts
+  /// Runs of `flats` flats: the first before all projections, the last behind them, others evenly between.
+  /// Two and more are written with their places, /exchange/data_white_at.
+  std::int64_t flat_runs = 1;
+  /// From the first to the last frame the open beam's ends rise and fall by this share: it is photons * (1 +
+  /// drift * time * x), x from -1 to 1 across the columns. Below 1.
+  double flat_drift = 0;
+  /// The share of its current that the beam loses from the first to the last frame; where it is not 0, the
+  /// currents are written, /exchange/beam_current. Below 1.
+  double beam_decay = 0;
 };
 
 /// Counts as Data Exchange: /exchange/data [angle][v][u] is offset + Poisson(photons e^-p), data_white offset

@@ -173,6 +173,8 @@ void add_geometry(nb::module_& m) {
       .def_rw("binning", &Preparation::binning)
       .def_rw("half_acquisition", &Preparation::half_acquisition)
       .def_rw("padding", &Preparation::padding)
+      .def_rw("flats_in_time", &Preparation::flats_in_time)
+      .def_rw("beam_current", &Preparation::beam_current)
       .def("__str__", [](const Preparation& p) { return text_of(p); });
 }
 
@@ -192,6 +194,7 @@ void add_projections(nb::module_& m) {
       .def_rw("flat", &InputStatement::flat)
       .def_rw("values", &InputStatement::values)
       .def_rw("angle_unit", &InputStatement::angle_unit)
+      .def_rw("beam_current", &InputStatement::beam_current)
       .def("__str__", [](const InputStatement& s) { return text_of(s); });
   nb::class_<Understood>(m, "Understood", "What was understood of a scan's files.")
       .def(nb::init<>())
@@ -203,6 +206,7 @@ void add_projections(nb::module_& m) {
       .def(nb::init<>())
       .def_rw("angles_file", &ScanOptions::angles_file)
       .def_rw("center", &ScanOptions::center)
+      .def_rw("shifts", &ScanOptions::shifts)
       .def_rw("preparation", &ScanOptions::preparation)
       .def_rw("beam", &ScanOptions::beam)
       .def_rw("input", &ScanOptions::input)
@@ -214,6 +218,7 @@ void add_projections(nb::module_& m) {
       .def_rw("center", &ArrayScan::center)
       .def_rw("half_acquisition", &ArrayScan::half_acquisition)
       .def_rw("padding", &ArrayScan::padding)
+      .def_rw("shifts", &ArrayScan::shifts)
       .def_rw("pitch_u", &ArrayScan::pitch_u)
       .def_rw("pitch_v", &ArrayScan::pitch_v)
       .def_rw("unit", &ArrayScan::unit)
@@ -229,6 +234,8 @@ void add_projections(nb::module_& m) {
       .def_prop_ro("unit", [](const ProjectionSet& s) { return s.geometry.unit; })
       .def_prop_ro("theta_rad", [](const ProjectionSet& s) { return s.geometry.theta_rad; })
       .def_prop_ro("angles_deg", [](const ProjectionSet& s) { return degrees_of(s.geometry.theta_rad); })
+      .def_prop_ro("column_shift", [](const ProjectionSet& s) { return s.geometry.column_shift; })
+      .def_prop_ro("row_shift", [](const ProjectionSet& s) { return s.geometry.row_shift; })
       .def_prop_ro("is_cone", [](const ProjectionSet& s) { return s.cone.has_value(); })
       .def_prop_ro("name", [](const ProjectionSet& s) { return s.report.name; })
       .def_prop_ro("sha256", [](const ProjectionSet& s) { return s.report.sha256; })

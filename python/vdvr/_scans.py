@@ -53,6 +53,8 @@ class Scan:
     half_acquisition : a full turn about an axis off the middle, whose opposite views are rows of a wider detector;
         by default as axis and arc say, and `notes` tell.
     pad : "edge" or "mirror": how rows of objects wider than the detector go on beyond it, tapering to zero.
+    shifts : how far the sample stood in each view towards higher columns, or columns and rows, in `unit`: array
+        [view] or [view, 2].
 
     Raises
     ------
@@ -76,6 +78,7 @@ class Scan:
         line_integrals: bool = False,
         half_acquisition: Optional[bool] = None,
         pad: str = "none",
+        shifts: Optional["ArrayLike"] = None,
     ) -> None:
         described = _core.ArrayScan()
         described.angles_deg = [float(a) for a in np.asarray(angles_deg, dtype=np.float64).ravel()]
@@ -86,6 +89,13 @@ class Scan:
         described.half_acquisition = half_acquisition
         described.padding = choice(_core.Padding, pad, "pad")
         described.name = name
+        if shifts is not None:
+            moved = np.asarray(shifts, dtype=np.float64)
+            if moved.ndim == 1:
+                moved = np.stack([moved, np.zeros_like(moved)], axis=1)
+            if moved.ndim != 2 or moved.shape[1] != 2:
+                raise _core.InputError(f"shifts: an array of shape {moved.shape}; [view] or [view, 2] is needed")
+            described.shifts = [[float(u), float(v)] for u, v in moved]
         self._understood = _core.Understood()
         self._source = None
         self._core = _core.scan_of(_projections(projections, line_integrals), described)
@@ -180,6 +190,7 @@ def read_scan(
     center: Optional[float] = None,
     angles_file: Optional[Path] = None,
     angle_unit: Optional[str] = None,
+    shifts: Optional[Path] = None,
     beam: Optional[str] = None,
     binning: int = 1,
     median: int = 1,
@@ -189,6 +200,8 @@ def read_scan(
     phase: Optional[Sequence[float]] = None,
     half_acquisition: Optional[bool] = None,
     pad: str = "none",
+    flats_in_time: Optional[bool] = None,
+    beam_current: Optional[str] = None,
     entry: Optional[str] = None,
     views: Union[str, Sequence[Sequence[int]], None] = None,
     darks: Union[str, float, None] = None,
@@ -208,6 +221,8 @@ def read_scan(
     center : column of the axis, in columns of the prepared projections; by default the file's, else found.
     angles_file : of an MHA or NRRD stack, or an HDF5 file: one angle a view.
     angle_unit : "degrees" or "radians", of the angles, whatever their file says.
+    shifts : a file of numbers, or "FILE.h5:/dataset": how far the sample stood in each view towards higher columns
+        [and rows], in the unit of the pitch; "none": it stood still, whatever the scan's files say.
     beam : "cone" or "parallel", of an NXtomo file that says it by its distances alone.
     binning : columns and rows that become one.
     median, gaussian : side of the median's window; standard deviations in columns and rows.
@@ -219,6 +234,10 @@ def read_scan(
     half_acquisition : a full turn about an axis off the middle, whose opposite views are rows of a wider detector;
         by default as axis and arc say, with a warning.
     pad : "edge" or "mirror": how rows of objects wider than the detector go on beyond it, tapering to zero.
+    flats_in_time : divides projections by what lies between the flats before and after them; by default where the
+        order of frames is known. False: by the mean of all flats.
+    beam_current : the dataset of an HDF5 file with the beam's current in each frame, by which frames are divided; by
+        default the usual one, where the file has it. "none": they are not.
     entry : the group of an HDF5 file that holds the scan, where there are several.
     views : the projections used: "0:40,41:90", or [(0, 40), (41, 90)], half-open.
     darks, flats : "none", or one number that stands for them: counts without beam, counts of the open beam.
@@ -231,8 +250,10 @@ def read_scan(
     options = _core.ScanOptions()
     options.center = None if center is None else number(center, "center")
     options.angles_file = None if angles_file is None else angles_file
+    options.shifts = "" if shifts is None else str(shifts)
     options.beam = None if beam is None else choice(_core.Beam, beam, "beam")
     options.input = _statement(entry, views, darks, flats, transmission, line_integrals, angle_unit)
+    options.input.beam_current = beam_current or ""
     options.follow_links = follow_links
     options.max_memory_bytes = _core.half_of_free_memory() if max_memory is None else int(max_memory)
     preparation = _core.Preparation()
@@ -248,6 +269,7 @@ def read_scan(
         preparation.phase = _step(_core.PhaseRetrieval(), members, numbers(phase, 3, "phase"), "phase")
     preparation.half_acquisition = None if half_acquisition is None else bool(half_acquisition)
     preparation.padding = choice(_core.Padding, pad, "pad")
+    preparation.flats_in_time = None if flats_in_time is None else bool(flats_in_time)
     options.preparation = preparation
     scan = Scan._of(*_core.read_scan(path, options, progress), _core.ScanSource(path, options))
     for text in scan.warnings:

@@ -53,7 +53,7 @@ void check_against_quadrature(const ProjectionSet& scan, const FieldOptions& fie
       std::vector<Vec3> points;
       std::vector<double> at_points;
       const auto collect = [&](double s) {
-        points.push_back(reference::on_ray(theta, chords.u[i], 0, s));
+        points.push_back(reference::on_ray(theta, chords.u[ray], 0, s));
         return 0.0;
       };
       reference::gauss5(collect, chords.first[ray], chords.last[ray], panels);
@@ -125,7 +125,7 @@ BOOST_AUTO_TEST_CASE(chords_end_where_coverage_ends) {
   const auto columns = static_cast<std::size_t>(scan.geometry.columns);
   const double beyond = 1e-6;  // far above the slack of covered(), 1e-9 of a column
   for (std::size_t ray = 0; ray < chords.first.size(); ++ray) {
-    const double theta = scan.geometry.theta_rad[ray / columns], u = chords.u[ray % columns];
+    const double theta = scan.geometry.theta_rad[ray / columns], u = chords.u[ray];
     if (!(chords.first[ray] < chords.last[ray])) {
       for (double s = -40; s < 40; s += 0.5) BOOST_TEST(!exact.covered(reference::on_ray(theta, u, 0, s)));
       continue;

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "host/field/fbp/coverage.hpp"
+#include "host/scan/prepare/common_heights.hpp"
 #include "tests/support/attack_scans.hpp"
 #include "vdvr/expert/build.hpp"
 #include "vdvr/expert/exact_field.hpp"
@@ -223,8 +224,9 @@ inline void draw_peak(Random& random, ParallelGeometry g, Case& c) {
   }
   std::vector<std::vector<double>> along_u;
   for (const double theta : g.theta_rad)
-    along_u.push_back(
-        attacks::peak(U, c.target[0] * std::cos(theta) + c.target[1] * std::sin(theta) + g.center, low));
+    along_u.push_back(attacks::peak(
+        U, c.target[0] * std::cos(theta) + c.target[1] * std::sin(theta) + g.center_of_view(along_u.size()),
+        low));
   const auto along_v = flat ? std::vector<double>(V, 1.0) : attacks::peak(V, c.target[2] + half, 1);
   c.name += std::string(on_axis ? ", peak on the axis" : ", peak off the axis") + ", waves from " +
             std::to_string(low) + (flat ? "" : ", in v too") + (alternate ? ", signs alternate" : "");
@@ -276,8 +278,32 @@ inline void draw_awkward(Random& random, const ParallelGeometry& g, Case& c) {
   }
 }
 
-inline void draw_scan(Random& random, Case& c) {
-  const ParallelGeometry g = draw_geometry(random, c.name);
+/// One case in five is of a sample that moved between views: along columns by up to a fifth of them, at
+/// random or in two steps, along rows by up to all but one, by whole rows or not. Drawn apart, so that other
+/// cases stay as they are.
+inline void draw_shifts(std::uint64_t seed, ParallelGeometry& g, std::string& name) {
+  Random random(seed * 0xa0761d6478bd642fu + 11);
+  if (!chance(random, 0.2)) return;
+  const bool along_columns = chance(random, 0.75),
+             along_rows = g.rows > 1 && (!along_columns || chance(random, 0.5)), steps = chance(random, 0.3),
+             whole = chance(random, 0.3);
+  const double wide = 0.2 * static_cast<double>(g.columns) * unit(random),
+               high = 0.5 * static_cast<double>(g.rows - 1) * unit(random);
+  for (std::size_t k = 0; k < g.theta_rad.size(); ++k) {
+    const auto at = [&](double reach) {
+      const double shift = reach * (steps ? (2 * k < g.theta_rad.size() ? -1 : 1) : 2 * unit(random) - 1);
+      return whole ? std::trunc(shift) : shift;
+    };
+    if (along_columns) g.column_shift.push_back(at(wide));
+    if (along_rows) g.row_shift.push_back(at(high));
+  }
+  name +=
+      std::string(", shifted") + (along_columns ? " along columns" : "") + (along_rows ? " along rows" : "");
+}
+
+inline void draw_scan(std::uint64_t of_shifts, Random& random, Case& c) {
+  ParallelGeometry g = draw_geometry(random, c.name);
+  draw_shifts(of_shifts, g, c.name);
   const auto seed = static_cast<unsigned>(random());
   switch (std::uniform_int_distribution<int>(0, 9)(random)) {
     case 0:
@@ -441,7 +467,8 @@ inline void draw_longer_rows(std::uint64_t seed, Case& c) {
   if (!chance(random, 0.2)) return;
   ParallelGeometry& g = c.scan.geometry;
   Preparation wanted;
-  wanted.half_acquisition = g.columns >= 11 && g.views() >= 3 && chance(random, 0.6);
+  wanted.half_acquisition =
+      g.column_shift.empty() && g.columns >= 11 && g.views() >= 3 && chance(random, 0.6);
   wanted.padding = one_of(random, {Padding::none, Padding::edge, Padding::mirror});
   if (*wanted.half_acquisition) {
     const double near = 5 + unit(random) * (0.5 * static_cast<double>(g.columns) - 5);
@@ -479,7 +506,9 @@ inline Case draw_case(std::uint64_t seed) {
   using namespace detail;
   Random random(seed * 0x9e3779b97f4a7c15u + 1);
   Case c;
-  draw_scan(random, c);
+  draw_scan(seed, random, c);
+  common_heights(c.scan, {}, 0, {});
+  c.scan.report.notes.clear();
   draw_longer_rows(seed, c);
   draw_options(random, c);
   draw_grid(random, c);

@@ -31,12 +31,26 @@ void add_options(Arguments& args) {
       .value("pitch", "P[,PV]",
              "world units per column [and per row] (default 1, or the volume's smallest spacing)")
       .value("detector-offset", "S", "columns by which the detector is moved towards higher ones (default 0)")
+      .value("shifts", "FILE",
+             "how far the object stands in each view towards higher columns [and rows], in world units "
+             "(parallel "
+             "beam)")
       .flag("point", "line integrals at the pixel centres")
       .flag("band-limited", "ideal low-pass at the detector's Nyquist frequency (default)")
       .value("noise-sigma", "S", "Gaussian noise, as a fraction of the largest line integral")
       .value(
           "photons", "N0",
           "counts of N0 photons a pixel in the open beam, with 10 flats and 10 darks, as a detector has them")
+      .value(
+          "flat-runs", "R",
+          "of --photons: runs of ten flats, the first before and the last behind all projections (default 1)")
+      .value("flat-drift", "D",
+             "of --photons: by this share the open beam tilts across the columns, from the first to the last "
+             "frame "
+             "(default 0)")
+      .value(
+          "beam-decay", "D",
+          "of --photons: the share of its current that the beam loses; the currents are written (default 0)")
       .value("seed", "N", "of the noise, and of a foam (default 1)")
       .value("median", "N", "side of a square median window on the fine detector, odd (default 1: none)")
       .value("gaussian", "SU,SV",
@@ -150,6 +164,10 @@ void apply_scan_options(const Arguments& args, SimulateOptions& scan) {
     if (!(scan.gaussian_u >= 0 && scan.gaussian_v >= 0))
       throw InputError(fmt::format("--gaussian: {} has a part below 0", args.text("gaussian")));
   }
+  if (args.has("shifts")) {
+    if (scan.cone) throw InputError("--shifts: is of parallel beam");
+    scan.shifts = read_shifts(args.path("shifts"), scan.angles);
+  }
   const CommonOptions common = common_options(args);
   scan.max_memory_bytes = common.max_memory;
   scan.scratch = common.scratch;
@@ -157,12 +175,18 @@ void apply_scan_options(const Arguments& args, SimulateOptions& scan) {
 }
 
 std::optional<PhotonCounts> photon_counts(const Arguments& args, const SimulateOptions& scan) {
-  if (!args.has("photons")) return std::nullopt;
+  if (!args.has("photons")) {
+    refuse(args, {"flat-runs", "flat-drift", "beam-decay"}, "goes with --photons");
+    return std::nullopt;
+  }
   refuse(args, {"noise-sigma", "median", "gaussian", "binning"},
          "excludes --photons: it counts in the detector's pixels");
   PhotonCounts counts;
   counts.photons = args.positive_or("photons", 0);
   counts.seed = scan.seed;
+  counts.flat_runs = args.integer_or("flat-runs", 1, 1, 1 << 20);
+  counts.flat_drift = args.number_or("flat-drift", 0);
+  counts.beam_decay = args.number_or("beam-decay", 0);
   return counts;
 }
 

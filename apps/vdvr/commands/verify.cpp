@@ -23,6 +23,9 @@ bool same_preparation(Preparation given, const Preparation& stored) {
     if (given.stripes->small == 0) given.stripes->small = stored.stripes->small;
   }
   if (!given.half_acquisition) given.half_acquisition = stored.half_acquisition;
+  if (!given.flats_in_time) given.flats_in_time = stored.flats_in_time;
+  given.beam_current = stored.beam_current;  // an option of the input
+  if (given.flats_in_time == false) given.flats_in_time = {};
   return given == stored;
 }
 

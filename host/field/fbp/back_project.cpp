@@ -81,7 +81,7 @@ void back_project(opencl::State& state, const ParallelGeometry& geometry, const 
       const ViewStep step = view_step(geometry, slab.columns, blocks, view);
       const double t = blocks.first[b][0] * std::cos(geometry.theta_rad[view]) +
                        blocks.first[b][1] * std::sin(geometry.theta_rad[view]);
-      const double s = slab.columns.column_of(t / geometry.pitch_u + geometry.center) +
+      const double s = slab.columns.column_of(t / geometry.pitch_u + geometry.center_of_view(view)) +
                        0.5 * (step.along_x * static_cast<double>(blocks.nx - 1) +
                               step.along_y * static_cast<double>(blocks.ny - 1));
       const double whole = std::round(s);

@@ -24,8 +24,15 @@ constexpr int circles = 64;
 
 std::pair<double, double> seen_columns(const ParallelGeometry& g) {
   const auto before = static_cast<double>(g.extension.before), after = static_cast<double>(g.extension.after);
-  const double below = g.center - before + 0.5,
-               above = static_cast<double>(g.columns) - after - 0.5 - g.center;
+  // Of the view that sees least on that side.
+  double low = 0, high = 0;
+  if (!g.column_shift.empty()) {
+    const auto [least, most] = std::minmax_element(g.column_shift.begin(), g.column_shift.end());
+    low = *least;
+    high = *most;
+  }
+  const double below = g.center + low - before + 0.5,
+               above = static_cast<double>(g.columns) - after - 0.5 - g.center - high;
   if (!g.extension.half_acquisition.value_or(false)) return {below, above};
   return {std::max(below, above), std::max(below, above)};
 }
@@ -39,12 +46,21 @@ Coverage::Coverage(const ParallelGeometry& g)
   heights_ = {-half_height, half_height};
   inner_ = std::min(below, above);
   if (!(inner_ > 0))
-    throw InputError(fmt::format("the centre {} does not fall on the detector's {} columns; correct `center`",
-                                 g.center, g.columns));
-  for (const double theta : g.theta_rad) {
-    const double c = std::cos(theta), s = std::sin(theta);
-    planes_.push_back({c, s, below});
-    planes_.push_back({-c, -s, above});
+    throw InputError(
+        fmt::format("the centre {} does not fall on the detector's {} columns{}; correct `center`", g.center,
+                    g.columns, g.column_shift.empty() ? "" : " in every view"));
+  ParallelGeometry one = g;
+  for (std::size_t k = 0; k < g.theta_rad.size(); ++k) {
+    const double c = std::cos(g.theta_rad[k]), s = std::sin(g.theta_rad[k]);
+    double low = below, high = above;
+    if (!g.column_shift.empty()) {
+      one.column_shift = {g.column_shift[k]};
+      const auto [towards_first, towards_last] = seen_columns(one);
+      low = towards_first * g.pitch_u;
+      high = towards_last * g.pitch_u;
+    }
+    planes_.push_back({c, s, low});
+    planes_.push_back({-c, -s, high});
   }
   index();
 }
@@ -262,7 +278,17 @@ std::vector<std::string> check_scan(const ParallelGeometry& g) {
   for (const double theta : g.theta_rad)
     if (!std::isfinite(theta)) throw InputError("an angle is not finite");
   const Coverage coverage(g);
-  if (!g.extension.half_acquisition && looks_half_acquired(g))
+  for (const std::vector<double>* shift : {&g.column_shift, &g.row_shift}) {
+    if (!shift->empty() && std::ssize(*shift) != g.views())
+      throw InputError(fmt::format("{} shifts for {} views", shift->size(), g.views()));
+    for (const double s : *shift)
+      if (!std::isfinite(s)) throw InputError("a shift is not finite");
+  }
+  if (!g.row_shift.empty() && !g.extension.common_heights)
+    throw InputError(
+        "views see other heights, and their rows were not brought to common ones when they were read "
+        "(common_heights)");
+  if (!g.extension.half_acquisition && g.column_shift.empty() && looks_half_acquired(g))
     throw InputError(fmt::format(
         "the axis projects onto column {:.2f} of {} in a scan all around: half acquisition, whose rows are "
         "weighted when it is read (extend_rows); or correct `center`",

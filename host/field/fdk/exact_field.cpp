@@ -214,7 +214,7 @@ std::vector<double> ExactField::at(std::span<const Vec3> points, const Progress&
       for (std::size_t h = 0; h < count; ++h)
         for (const std::size_t i : *heights[first + h].second) {
           const double t = points[i][0] * c + points[i][1] * s;
-          const double column = t / geometry_.pitch_u + geometry_.center;
+          const double column = t / geometry_.pitch_u + geometry_.center_of_view(k);
           values[i] += cosine_sum(line.data() + h * columns, U, pi * (column + 0.5) / static_cast<double>(U));
         }
     }

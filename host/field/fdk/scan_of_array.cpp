@@ -10,6 +10,7 @@
 
 #include "vdvr/error.hpp"
 #include "vdvr/expert/extend_rows.hpp"
+#include "host/scan/prepare/common_heights.hpp"
 #include "vdvr/expert/find_center.hpp"
 #include "vdvr/expert/hash.hpp"
 #include "vdvr/expert/reconstruct.hpp"
@@ -47,6 +48,17 @@ ParallelGeometry geometry_of(const ArrayScan& d) {
       throw InputError(fmt::format("angles: angle {} is {}", k, d.angles_deg[k]));
     g.theta_rad.push_back(d.angles_deg[k] * (std::numbers::pi / 180));
   }
+  for (std::size_t k = 0; k < d.shifts.size(); ++k) {
+    if (d.shifts.size() != d.angles_deg.size() || !std::isfinite(d.shifts[k][0]) ||
+        !std::isfinite(d.shifts[k][1]))
+      throw InputError(
+          fmt::format("shifts: {} for {} views, view {} by {}, {}; one finite pair is needed for each",
+                      d.shifts.size(), d.angles_deg.size(), k, d.shifts[k][0], d.shifts[k][1]));
+    g.column_shift.push_back(d.shifts[k][0] / d.pitch_u);
+    g.row_shift.push_back(d.shifts[k][1] / d.pitch_v);
+  }
+  for (std::vector<double>* shift : {&g.column_shift, &g.row_shift})
+    if (std::all_of(shift->begin(), shift->end(), [](double s) { return s == 0; })) shift->clear();
   return g;
 }
 
@@ -63,6 +75,7 @@ std::string hash_of(const SampleArray& data, const ArrayScan& d) {
   std::string text =
       fmt::format("{} {} {} {} {} {}", d.angles_deg.size(), d.rows, d.columns, d.pitch_u, d.pitch_v, d.unit);
   for (const double angle : d.angles_deg) text += fmt::format(" {}", angle);
+  for (const auto& shift : d.shifts) text += fmt::format(" {} {}", shift[0], shift[1]);
   text += '\n';
   Sha256 hash;
   hash.update(text.data(), text.size());
@@ -103,6 +116,7 @@ ProjectionSet scan_of_array(SampleArray data, const ArrayScan& described) {
   scan.report.name = described.name;
   scan.report.format = "array";
   scan.report.sha256 = hash_of(scan.data, described);
+  common_heights(scan, {}, 0, {});
   set_center(scan, described.center);
   Preparation wanted;
   wanted.half_acquisition = described.half_acquisition;

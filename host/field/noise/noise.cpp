@@ -134,7 +134,8 @@ std::optional<ScanNoise> scan_noise(const ProjectionSet& scan, const NoiseOption
       given->words += "; the projections were prepared, which lowers their noise: sigma is too large";
     return given;
   }
-  if (scan.geometry.extension != RowExtension{}) return scan_noise(own_rows(scan), options, by_flats, why);
+  if (scan.geometry.extension != own_detector(scan.geometry).extension)
+    return scan_noise(own_rows(scan), options, by_flats, why);
   const auto none = [&](std::string reason) -> std::optional<ScanNoise> {
     if (why) *why = std::move(reason);
     return std::nullopt;

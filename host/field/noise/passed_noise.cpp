@@ -106,6 +106,8 @@ ProjectionSet like(const ProjectionSet& prepared, const Window& window) {
   out.geometry.pitch_u /= b;
   out.geometry.pitch_v /= b;
   out.geometry.theta_rad.clear();
+  out.geometry.column_shift.clear();  // of views that are left out too, and noise does not follow them
+  out.geometry.row_shift.clear();
   for (const std::int64_t k : window.views)
     out.geometry.theta_rad.push_back(prepared.geometry.theta_rad[at(k)]);
   out.data = SampleArray(std::vector<float>(at(out.size())));
@@ -194,6 +196,10 @@ bool changes_noise(Preparation preparation) {
   preparation.binning = Preparation{}.binning;
   preparation.half_acquisition = {};
   preparation.padding = {};
+  // Of normalisation, which the noise of counts has in it already.
+  preparation.flats_in_time = preparation.beam_current = {};
+  // S_v of rows of equal noise has that noise too, but for its correlation along z.
+  preparation.common_heights = {};
   return !preparation.none();
 }
 

@@ -20,6 +20,22 @@ ScanOptions as_measured(ScanOptions how, const ProjectionSet& scan) {
   return how;
 }
 
+// Of flats, pixel by pixel, at the heights that all views see: of the measured row that lies there where the
+// sample stood in the middle.
+std::optional<LineIntegralNoise> noise_of_flats(const std::filesystem::path& path, const ScanOptions& how,
+                                                const ParallelGeometry& g) {
+  std::optional<LineIntegralNoise> noise = read_line_noise(path, how);
+  if (!noise || !g.extension.common_heights) return noise;
+  const std::int64_t columns = own_detector(g).columns;
+  for (std::vector<float>* values : {&noise->photon, &noise->read}) {
+    const std::int64_t rows = std::ssize(*values) / columns;
+    if (rows <= g.rows) continue;
+    const auto first = values->begin() + (rows - g.rows) / 2 * columns;
+    *values = {first, first + g.rows * columns};
+  }
+  return noise;
+}
+
 std::optional<ScanNoise> of_prepared(const std::filesystem::path& path, const ScanOptions& how,
                                      const ProjectionSet& scan, const NoiseOptions& options, std::string* why,
                                      const Progress& progress) {
@@ -35,7 +51,7 @@ std::optional<ScanNoise> of_prepared(const std::filesystem::path& path, const Sc
       throw FileError(path.string() + ": was changed while it was read; start again once it is whole");
     rows = unprepared.geometry.rows;
     columns = unprepared.geometry.columns;
-    found = scan_noise(unprepared, options, read_line_noise(path, measured), why);
+    found = scan_noise(unprepared, options, noise_of_flats(path, measured, unprepared.geometry), why);
   }
   if (!found) return found;
   found->model = passed_noise(found->model, rows, columns, scan, how.max_memory_bytes);
@@ -50,11 +66,11 @@ std::optional<ScanNoise> of_prepared(const std::filesystem::path& path, const Sc
 std::optional<ScanNoise> read_scan_noise(const std::filesystem::path& path, const ScanOptions& how,
                                          const ProjectionSet& scan, const NoiseOptions& options,
                                          std::string* why, const Progress& progress) {
-  if (scan.geometry.extension != RowExtension{})
+  if (scan.geometry.extension != own_detector(scan.geometry).extension)
     return read_scan_noise(path, how, own_rows(scan), options, why, progress);
   if (!changes_noise(scan.report.preparation)) {
     const bool stated = options.photons || options.sigma_p;
-    return scan_noise(scan, options, stated ? std::nullopt : read_line_noise(path, how), why);
+    return scan_noise(scan, options, stated ? std::nullopt : noise_of_flats(path, how, scan.geometry), why);
   }
   try {
     return of_prepared(path, how, scan, options, why, progress);

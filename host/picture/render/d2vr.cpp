@@ -121,10 +121,11 @@ std::vector<cl_float4> Projections::views(const Grid& grid) const {
   const ParallelGeometry& g = geometry;
   const double n = rate;
   std::vector<cl_float4> steps;
-  for (const double theta : g.theta_rad) {
+  for (std::size_t k = 0; k < g.theta_rad.size(); ++k) {
+    const double theta = g.theta_rad[k];
     // In double precision up to here: what is left to round is the position in cells.
     const double c = std::cos(theta) / g.pitch_u, s = std::sin(theta) / g.pitch_u;
-    const double first = grid.origin[0] * c + grid.origin[1] * s + g.center - first_column;
+    const double first = grid.origin[0] * c + grid.origin[1] * s + g.center_of_view(k) - first_column;
     steps.push_back({{static_cast<float>(grid.spacing[0] * c * n),
                       static_cast<float>(grid.spacing[1] * s * n), static_cast<float>(first * n), 0.0f}});
   }

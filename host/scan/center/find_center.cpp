@@ -79,6 +79,28 @@ std::optional<CenterEstimate> of_cone(const ProjectionSet& scan) {
   return found;
 }
 
+// Where the sample moved along columns, views as they would be of one that only turns: read between columns,
+// which is near enough to look for mirror images.
+ProjectionSet brought_back(const ProjectionSet& scan) {
+  ProjectionSet out = scan;
+  ParallelGeometry& g = out.geometry;
+  for (std::int64_t k = 0; k < g.views(); ++k)
+    for (std::int64_t r = 0; r < g.rows; ++r) {
+      const std::int64_t first = (k * g.rows + r) * g.columns;
+      for (std::int64_t i = 0; i < g.columns; ++i) {
+        const double place = std::clamp(static_cast<double>(i) + g.column_shift[static_cast<std::size_t>(k)],
+                                        0.0, static_cast<double>(g.columns - 1));
+        const auto low = std::min(static_cast<std::int64_t>(place), g.columns - 2);
+        const double part = place - static_cast<double>(low);
+        const float* p = scan.data.data() + first + low;
+        out.data[static_cast<std::size_t>(first + i)] =
+            static_cast<float>((1 - part) * static_cast<double>(p[0]) + part * static_cast<double>(p[1]));
+      }
+    }
+  g.column_shift.clear();
+  return out;
+}
+
 }  // namespace
 
 std::optional<CenterEstimate> find_center(const ProjectionSet& scan) {
@@ -86,6 +108,8 @@ std::optional<CenterEstimate> find_center(const ProjectionSet& scan) {
   if (static_cast<std::int64_t>(scan.data.size()) != scan.size())
     throw InputError(fmt::format("{} samples for {} views of {} x {}", scan.data.size(),
                                  scan.geometry.views(), scan.geometry.rows, scan.geometry.columns));
+  if (!scan.geometry.column_shift.empty() && scan.geometry.columns > 1)
+    return find_center(brought_back(scan));
   if (is_flat(scan)) return std::nullopt;
   if (scan.cone) return of_cone(scan);
   const auto opposite = center::from_opposite_views(scan);

@@ -2,13 +2,17 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <fstream>
 #include <set>
 
+#include "host/base/system/length_unit.hpp"
+#include "host/files/hdf5/hdf5_reader.hpp"
 #include "host/files/io/raster_file.hpp"
 #include "host/files/io/text_encoding.hpp"
 #include "host/scan/open/scan_folder.hpp"
 #include "host/scan/raw/hdf5_scan.hpp"
+#include "host/scan/raw/hdf5_frames.hpp"
 #include "host/scan/raw/raster_scan.hpp"
 #include "vdvr/error.hpp"
 
@@ -41,7 +45,8 @@ bool is_json(const fs::path& path) {
 
 RawScan open_hdf5(const fs::path& path, const ScanOptions& options) {
   const InputStatement& stated = options.input;
-  Hdf5Wanted wanted{stated.entry, options.beam, !options.angles_file, {}, stated.angle_unit};
+  Hdf5Wanted wanted{stated.entry, options.beam,      !options.angles_file,
+                    {},           stated.angle_unit, stated.beam_current};
   if (options.angles_file)
     wanted.angles_deg =
         in_degrees(read_numbers(*options.angles_file), stated.angle_unit.value_or(AngleUnit::degrees));
@@ -107,8 +112,42 @@ bool may_name_hdf5(const fs::path& description) {
 
 }  // namespace
 
+// FILE of numbers, or FILE.h5:/dataset, whose attribute units counts; "none".
+void shifts_by_option(const ScanOptions& options, RawScan& raw) {
+  if (options.shifts == "none") {
+    raw.shift_u.clear();
+    raw.shift_v.clear();
+    raw.shifts_source = "`shifts` none";
+    return;
+  }
+  const std::size_t colon = options.shifts.find(":/");
+  if (colon == std::string::npos) {
+    state_shifts(raw, read_numbers(options.shifts), options.shifts);
+    return;
+  }
+  const hdf5::Reader file(options.shifts.substr(0, colon), hdf5::Links::within_folder);
+  const std::string object = options.shifts.substr(colon + 1);
+  if (!file.is_dataset(object)) file.refuse(object, "no such dataset, the shifts (`shifts`)");
+  const hdf5::Dataset data = file.numeric_dataset(object);
+  if (count_of(data) > 2 * raw.projections.count)
+    throw FileError(fmt::format("{}: {} numbers for {} projections; one for each is needed, or two",
+                                data.name, count_of(data), raw.projections.count));
+  std::vector<double> numbers = data.read_all();
+  if (const auto unit = file.find_text(object, "units")) {
+    const auto from = metres_exponent(utf8_of(*unit)), to = metres_exponent(raw.unit);
+    if (utf8_of(*unit) != raw.unit && (!from || !to))
+      throw FileError(
+          fmt::format("{}: units '{}', and the pitch is in '{}': neither the same nor both lengths",
+                      data.name, *unit, raw.unit));
+    if (from && to)
+      for (double& number : numbers) number *= std::pow(10.0, *from - *to);
+  }
+  state_shifts(raw, numbers, options.shifts);
+}
+
 RawScan open_scan(const fs::path& path, const ScanOptions& options, bool& folder) {
   RawScan raw = open_files(path, options, folder);
+  if (!options.shifts.empty()) shifts_by_option(options, raw);
   if (!options.input.views.empty()) select_views(raw, options.input.views);
   const std::set<std::string> names(raw.view_files.begin(), raw.view_files.end());
   for (const std::string& name : names) raw.files.emplace_back(name, raw.folder / name);

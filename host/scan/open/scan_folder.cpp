@@ -25,10 +25,11 @@ namespace {
 namespace fs = std::filesystem;
 
 std::set<std::string> known_members() {
-  std::set<std::string> known{"projections", "hdf5",        "flats",           "darks",      "angles",
-                              "angle_range", "use",         "center",          "pitch",      "unit",
-                              "air_columns", "description", "comment",         "redundancy", "beam",
-                              "entry",       "angle_unit",  "half_acquisition"};
+  std::set<std::string> known{
+      "projections", "hdf5",         "flats", "darks", "angles",      "angle_range",
+      "use",         "center",       "pitch", "unit",  "air_columns", "description",
+      "comment",     "redundancy",   "beam",  "entry", "angle_unit",  "half_acquisition",
+      "flats_at",    "beam_current", "shifts"};
   known.insert(cone_kinds.begin(), cone_kinds.end());
   return known;
 }
@@ -112,6 +113,8 @@ void set_counts(const Description& about, const std::optional<NikonScan>& nikon,
     scan.dark_level = 0;
     return;
   }
+  // What the HDF5 file says of its own flats is of others.
+  if (about.has("flats")) scan.beam_in_time = {};
   if (about.has("flats")) set_reference(about, "flats", max_memory_bytes, scan, scan.flats, scan.flat_level);
   if (about.has("darks")) set_reference(about, "darks", max_memory_bytes, scan, scan.darks, scan.dark_level);
   const std::string name = (about.folder() / "scan.json").string();
@@ -193,6 +196,7 @@ RawScan open_hdf5(const Description& about, const ScanOptions& options, bool con
                   std::optional<AngleUnit> unit) {
   Hdf5Wanted wanted;
   wanted.angle_unit = unit;
+  wanted.beam_current = options.input.beam_current;
   wanted.entry = options.input.entry;
   if (wanted.entry.empty() && about.has("entry")) wanted.entry = about.text("entry");
   if (cone) wanted.beam = Beam::cone;
@@ -225,6 +229,64 @@ void set_geometry(const Description& about, RawScan& scan) {
     count += last - first + 1;
   }
   if (count < 2) about.fail("'air_columns' must name at least two columns: a line is fitted through them");
+}
+
+// A list of scan.json, or the numbers of a file beside it.
+std::vector<double> listed_numbers(const Description& about, const char* key, RawScan& scan) {
+  if (about.is_list(key)) return about.numbers(key);
+  const std::string name = about.text(key);
+  std::vector<double> all = read_numbers(about.inside(name, key));
+  use_file(scan, about, name);
+  return all;
+}
+
+// When flats were taken, and how bright the beam was.
+void set_beam_in_time(const Description& about, const InputStatement& stated, RawScan& scan) {
+  const std::int64_t projections = scan.projections.count, flats = scan.flats.count;
+  for (const char* key : {"flats_at", "beam_current"})
+    if (about.has(key) && !about.is_text(key, "none") && (flats == 0 || scan.flat_level))
+      about.fail(fmt::format("'{}' needs flats that are images", key));
+  if (about.has("flats_at")) {
+    const auto places = listed_numbers(about, "flats_at", scan);
+    if (std::ssize(places) != flats)
+      about.fail(
+          fmt::format("'flats_at' has {} numbers for {} flats; one for each is needed: how many "
+                      "projections were taken before it",
+                      places.size(), flats));
+    place_flats(scan, places, (about.folder() / "scan.json").string() + ": 'flats_at'");
+  }
+  BeamInTime& beam = scan.beam_in_time;
+  if (!stated.beam_current.empty() && stated.beam_current != "none" && !about.has("hdf5"))
+    throw InputError(fmt::format("{}: `beam_current` names a dataset of an HDF5 file, and there is no 'hdf5'",
+                                 (about.folder() / "scan.json").string()));
+  if (!about.has("beam_current") || !stated.beam_current.empty()) return;
+  beam.projection_currents.clear();
+  beam.flat_currents.clear();
+  if (about.is_text("beam_current", "none")) return;
+  const auto currents = listed_numbers(about, "beam_current", scan);
+  if (std::ssize(currents) != projections + flats)
+    about.fail(
+        fmt::format("'beam_current' has {} numbers for {} projections and {} flats; one for each is "
+                    "needed, projections first",
+                    currents.size(), projections, flats));
+  beam.currents = "'beam_current' of scan.json";
+  beam.projection_currents = {currents.begin(), currents.begin() + projections};
+  beam.flat_currents = {currents.begin() + projections, currents.end()};
+}
+
+// By view a number (columns) or a pair (and rows), as a list or in a file; "none".
+void set_shifts(const Description& about, RawScan& scan) {
+  if (!about.has("shifts")) return;
+  const std::string source = (about.folder() / "scan.json").string() + ": 'shifts'";
+  if (about.is_text("shifts", "none")) {
+    scan.shift_u.clear();
+    scan.shift_v.clear();
+    scan.shifts_source = source;
+    return;
+  }
+  state_shifts(scan,
+               about.is_table("shifts") ? about.table("shifts", 2) : listed_numbers(about, "shifts", scan),
+               source);
 }
 
 void set_angles(const Description& about, RawScan& scan) {
@@ -280,10 +342,12 @@ RawScan open_scan_folder(const fs::path& folder, const ScanOptions& options) {
   scan.folder = folder;
   scan.angle_unit = angle_unit.value_or(AngleUnit::degrees);
   use_file(scan, about, "scan.json");
+  set_beam_in_time(about, options.input, scan);
   set_geometry(about, scan);
   if (distances) set_cone(about, "beam", scan);
   else if (const auto kind = cone_kind(about)) set_cone(about, *kind, scan);
   else set_angles(about, scan);
+  set_shifts(about, scan);
   // Views that options choose are chosen among all.
   if (about.has("use") && options.input.views.empty()) use_views(about, scan);
   return scan;

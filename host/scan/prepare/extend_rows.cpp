@@ -71,6 +71,7 @@ void require_half_acquisition(const ParallelGeometry& own) {
 
 RowExtension extension_of(const ParallelGeometry& own, bool half, Padding padding) {
   RowExtension e;
+  e.common_heights = own.extension.common_heights;
   e.padding = padding;
   e.center = own.center;
   const Sides sides(own);
@@ -198,7 +199,12 @@ std::string extend_rows(ProjectionSet& scan, const Preparation& wanted, std::uin
     return {};
   }
   ParallelGeometry& g = scan.geometry;
-  const bool looks = looks_half_acquired(g), half = wanted.half_acquisition.value_or(looks);
+  if (!g.column_shift.empty() && wanted.half_acquisition.value_or(false))
+    throw InputError(
+        "half acquisition: its weights go by the distance from one axis, and the sample moved along columns; "
+        "`half_acquisition` off takes the views as they are");
+  const bool looks = g.column_shift.empty() && looks_half_acquired(g),
+             half = wanted.half_acquisition.value_or(looks);
   if (half) require_half_acquisition(g);
   recorded.padding = wanted.padding;
   recorded.half_acquisition = {};
@@ -228,6 +234,7 @@ ParallelGeometry own_detector(const ParallelGeometry& g) {
     own.center = e.center;
   }
   own.extension = {};
+  own.extension.common_heights = e.common_heights;
   return own;
 }
 
@@ -239,7 +246,7 @@ std::vector<float> row_factors(const ParallelGeometry& g) {
 }
 
 ProjectionSet own_rows(const ProjectionSet& scan) {
-  if (scan.geometry.extension == RowExtension{}) return scan;
+  if (scan.geometry.extension == own_detector(scan.geometry).extension) return scan;
   ProjectionSet out;
   out.geometry = own_detector(scan.geometry);
   out.report = scan.report;

@@ -52,6 +52,12 @@ void check_preparation(const Preparation& p) {
     throw InputError(fmt::format("binning: {} must be from 1 to {}", p.binning, most_binning));
 }
 
+Preparation as_recorded(Preparation p) {
+  p.flats_in_time = p.flats_in_time.value_or(false);
+  p.beam_current = p.beam_current.value_or(false);
+  return p;
+}
+
 Preparation for_columns(Preparation p, std::int64_t columns) {
   constexpr std::int64_t least = 5, most_large = 51, most_small = 21;
   const auto odd = [](std::int64_t n) { return static_cast<int>(n - 1 + n % 2); };
@@ -62,6 +68,8 @@ Preparation for_columns(Preparation p, std::int64_t columns) {
 
 std::string text_of(const Preparation& p) {
   std::vector<std::string> steps;
+  if (p.flats_in_time) steps.emplace_back(*p.flats_in_time ? "flats in time" : "flats' mean");
+  if (p.beam_current) steps.emplace_back(*p.beam_current ? "beam current" : "no beam current");
   if (p.outliers) steps.push_back(fmt::format("outliers {},{}", p.outliers->threshold, p.outliers->window));
   if (p.phase)
     steps.push_back(
@@ -73,6 +81,7 @@ std::string text_of(const Preparation& p) {
     steps.push_back(fmt::format("gaussian {},{}", p.gaussian[0], p.gaussian[1]));
   if (p.binning > 1) steps.push_back(fmt::format("binning {}", p.binning));
   if (p.half_acquisition) steps.push_back(*p.half_acquisition ? "half acquisition" : "no half acquisition");
+  if (p.common_heights) steps.emplace_back(*p.common_heights ? "common heights" : "heights as seen");
   if (p.padding != Padding::none) steps.push_back(fmt::format("pad {}", text_of(p.padding)));
   return steps.empty() ? "none" : fmt::format("{}", fmt::join(steps, "; "));
 }

@@ -46,6 +46,13 @@ int whole(const Json& object, const std::string& what, const char* name) {
   return whole(object.at(name), fmt::format("{}: '{}'", what, name));
 }
 
+// True or false, where the member is there.
+std::optional<bool> said(const Json& object, const char* name) {
+  if (!object.contains(name)) return {};
+  if (!object.at(name).is_boolean()) throw InputError(fmt::format("{}: expected true or false", name));
+  return object.at(name).get<bool>();
+}
+
 }  // namespace
 
 Json json_of(const Preparation& p) {
@@ -62,13 +69,16 @@ Json json_of(const Preparation& p) {
   if (p.binning > 1) json["binning"] = p.binning;
   if (p.half_acquisition) json["half_acquisition"] = *p.half_acquisition;
   if (p.padding != Padding::none) json["pad"] = text_of(p.padding);
+  if (p.common_heights) json["common_heights"] = *p.common_heights;
+  if (p.flats_in_time) json["flats_in_time"] = *p.flats_in_time;
+  if (p.beam_current) json["beam_current"] = *p.beam_current;
   return json;
 }
 
 Preparation preparation_of(const Json& json) {
-  require_members(
-      json, "preparation",
-      {"outliers", "phase", "stripes", "median", "gaussian", "binning", "half_acquisition", "pad"});
+  require_members(json, "preparation",
+                  {"outliers", "phase", "stripes", "median", "gaussian", "binning", "half_acquisition", "pad",
+                   "flats_in_time", "beam_current", "common_heights"});
   Preparation p;
   if (json.contains("outliers")) {
     const Json& o = json.at("outliers");
@@ -94,11 +104,10 @@ Preparation preparation_of(const Json& json) {
     p.gaussian = {number(o.at(0), "gaussian"), number(o.at(1), "gaussian")};
   }
   if (json.contains("binning")) p.binning = whole(json.at("binning"), "binning");
-  if (json.contains("half_acquisition")) {
-    if (!json.at("half_acquisition").is_boolean())
-      throw InputError("half_acquisition: expected true or false");
-    p.half_acquisition = json.at("half_acquisition").get<bool>();
-  }
+  p.half_acquisition = said(json, "half_acquisition");
+  p.common_heights = said(json, "common_heights");
+  p.flats_in_time = said(json, "flats_in_time");
+  p.beam_current = said(json, "beam_current");
   if (json.contains("pad")) {
     const Json& text = json.at("pad");
     const auto padding = padding_of(text.is_string() ? text.get<std::string>() : "");

@@ -83,6 +83,8 @@ void bin_geometry(ProjectionSet& scan, int b) {
   }
   g.center = binned_center(g.center, b);
   g.pitch_u *= b, g.pitch_v *= b;
+  for (double& shift : g.column_shift) shift /= b;
+  for (double& shift : g.row_shift) shift /= b;
 }
 
 }  // namespace

@@ -23,6 +23,27 @@ void open_reference(const Reader& file, const std::string& object, const char* w
   frames = all_frames(stack, what);
 }
 
+// When flats were taken, by how many projections came before each, and the current in every frame.
+void read_beam_in_time(const Reader& file, const std::string& group, const Hdf5Wanted& wanted,
+                       RawScan& scan) {
+  BeamInTime& beam = scan.beam_in_time;
+  const std::int64_t projections = scan.projections.count, flats = scan.flats.count;
+  const std::vector<double> currents =
+      read_currents(file, wanted.beam_current, group + "/beam_current", projections + flats,
+                    "projections first, then flats", beam.currents);
+  if (!currents.empty()) {
+    beam.projection_currents = {currents.begin(), currents.begin() + projections};
+    beam.flat_currents = {currents.begin() + projections, currents.end()};
+  }
+  const std::string object = group + "/data_white_at";
+  if (!file.is_dataset(object)) return;
+  const hdf5::Dataset data = file.numeric_dataset(object);
+  if (count_of(data) != flats)
+    throw FileError(
+        fmt::format("{}: {} places for {} flats; one for each is needed", data.name, count_of(data), flats));
+  place_flats(scan, data.read_all(), data.name);
+}
+
 }  // namespace
 
 bool is_data_exchange(const Reader& file, const std::string& group) {
@@ -57,6 +78,14 @@ RawScan open_data_exchange(const Reader& file, const std::string& group, const H
   }
   open_reference(file, group + "/data_white", "flat", data, scan.flats, scan.no_flats);
   open_reference(file, group + "/data_dark", "dark", data, scan.darks, scan.no_darks);
+  read_beam_in_time(file, group, wanted, scan);
+  if (const std::string shifts = group + "/shifts"; file.is_dataset(shifts)) {
+    const hdf5::Dataset list = file.numeric_dataset(shifts);
+    if (count_of(list) > 2 * data.count)
+      throw FileError(fmt::format("{}: {} numbers for {} projections; one for each is needed, or two",
+                                  list.name, count_of(list), data.count));
+    state_shifts(scan, list.read_all(), list.name);
+  }
   return scan;
 }
 

@@ -143,6 +143,23 @@ std::vector<double> read_angles(const Reader& file, const std::string& object,
   return in_degrees(data.read_all(), unit);
 }
 
+std::vector<double> read_currents(const Reader& file, const std::string& wanted, const std::string& usual,
+                                  std::int64_t frames, const char* order, std::string& name) {
+  if (wanted == "none") return {};
+  const std::string object = wanted.empty() ? usual : wanted;
+  if (wanted.empty() && !file.is_dataset(object)) return {};
+  if (!file.is_dataset(object)) file.refuse(object, "no such dataset, the beam's current (`beam_current`)");
+  const Dataset data = file.numeric_dataset(object);
+  if (wanted.empty() && count_of(data) == 1) return {};
+  if (count_of(data) != frames)
+    throw FileError(
+        fmt::format("{}: {} currents of the beam for {} frames; one for each is needed, {}; `beam_current` "
+                    "none leaves them out",
+                    data.name, count_of(data), frames, order));
+  name = object;
+  return data.read_all();
+}
+
 void require_same_detector(const FrameStack& a, const FrameStack& b) {
   if (a.rows != b.rows || a.columns != b.columns)
     throw FileError(fmt::format("{}: frames of {} rows x {} columns, but {} has {} x {}", b.data->name,

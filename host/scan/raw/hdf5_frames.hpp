@@ -19,6 +19,7 @@ struct Hdf5Wanted {
   bool own_angles = true;    ///< false: the file's are not looked at; these are taken
   std::vector<double> angles_deg;
   std::optional<AngleUnit> angle_unit;  ///< of the file's own, whatever it says
+  std::string beam_current{};           ///< as InputStatement's
 };
 
 struct FrameStack {
@@ -33,6 +34,11 @@ FrameStack open_frames(const hdf5::Reader& file, const std::string& object, int 
 Frames all_frames(const FrameStack& stack, const std::string& what);
 /// Some of a stack's frames, by number, read in runs of neighbours.
 Frames frames_of(const FrameStack& stack, std::vector<std::int64_t> numbers, const std::string& what);
+/// The beam's current in each of `frames` frames: of the dataset that is `wanted`, else of the `usual` one
+/// where the file has it. Empty where there is none, and where one number is all it says. Throws FileError.
+std::vector<double> read_currents(const hdf5::Reader& file, const std::string& wanted,
+                                  const std::string& usual, std::int64_t frames, const char* order,
+                                  std::string& name);
 void require_same_detector(const FrameStack& a, const FrameStack& b);
 
 /// How many numbers a list holds; looked at before it is read, since a damaged header may claim any.

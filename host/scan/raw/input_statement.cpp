@@ -106,6 +106,7 @@ std::string text_of(const InputStatement& s) {
   if (s.flat) add(fmt::format("flats {}", *s.flat));
   if (s.values) add(text_of(*s.values));
   if (s.angle_unit) add(fmt::format("angles in {}", text_of(*s.angle_unit)));
+  if (!s.beam_current.empty()) add("beam current " + s.beam_current);
   return text.empty() ? "none" : text;
 }
 

@@ -117,6 +117,24 @@ std::vector<double> angles_of(const Reader& file, const std::string& object, con
   return angles;
 }
 
+// --- the beam ---
+
+void read_beam_in_time(const Reader& file, const std::string& entry, const KeyedFrames& frames,
+                       const FrameStack& data, const std::string& wanted, RawScan& scan) {
+  BeamInTime& beam = scan.beam_in_time;
+  for (const std::int64_t k : frames.of_key[0]) beam.projections_at.push_back(static_cast<double>(k));
+  for (const std::int64_t k : frames.of_key[1]) beam.flats_at.push_back(static_cast<double>(k));
+  std::string monitor = child_of(file, entry, "NXmonitor", "control");
+  if (monitor.empty()) monitor = entry + "/control";
+  const std::vector<double> currents =
+      read_currents(file, wanted, monitor + "/data", data.count, "in the order of image_key", beam.currents);
+  if (currents.empty()) return;
+  for (const std::int64_t k : frames.of_key[0])
+    beam.projection_currents.push_back(currents[static_cast<std::size_t>(k)]);
+  for (const std::int64_t k : frames.of_key[1])
+    beam.flat_currents.push_back(currents[static_cast<std::size_t>(k)]);
+}
+
 // --- where the sample was ---
 
 void read_positions(const Reader& file, const std::string& sample, const std::vector<std::int64_t>& frames,
@@ -197,6 +215,7 @@ RawScan open_nxtomo(const Reader& file, const TomoEntry& where, const Hdf5Wanted
   const std::string key = fmt::format("{}: {}/image_key", file.path(), where.detector);
   if (scan.flats.count == 0) scan.no_flats = key + ": marks no flats (key 1)";
   if (scan.darks.count == 0) scan.no_darks = key + ": marks no darks (key 2)";
+  read_beam_in_time(file, where.entry, frames, data, wanted.beam_current, scan);
   read_pixel_size(file, where.detector, scan);
   read_positions(file, sample, frames.of_key[0], data, scan);
   const NxtomoGroups groups{where.detector, child_of(file, where.instrument, "NXsource", "source"), sample};

@@ -1,8 +1,13 @@
 #include "host/scan/raw/raw_scan.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <numbers>
+
+#include "vdvr/error.hpp"
 
 namespace vdvr::io {
 
@@ -20,6 +25,46 @@ std::vector<double> in_degrees(std::vector<double> angles, AngleUnit unit) {
   if (unit == AngleUnit::radians)
     for (double& angle : angles) angle *= 180 / std::numbers::pi;
   return angles;
+}
+
+void place_flats(RawScan& scan, const std::vector<double>& projections_before, const std::string& name) {
+  const auto last = static_cast<double>(scan.projections.count);
+  BeamInTime& beam = scan.beam_in_time;
+  beam.flats_at.clear();
+  beam.projections_at.clear();
+  for (const double before : projections_before) {
+    if (!(before >= 0 && before <= last) || before != std::floor(before))
+      throw FileError(fmt::format(
+          "{}: a flat after {} projections; it must be a whole number from 0 to the {} that there "
+          "are",
+          name, before, scan.projections.count));
+    beam.flats_at.push_back(before - 0.5);
+  }
+  for (std::int64_t k = 0; k < scan.projections.count; ++k)
+    beam.projections_at.push_back(static_cast<double>(k));
+}
+
+void state_shifts(RawScan& scan, const std::vector<double>& numbers, const std::string& source) {
+  const auto views = scan.projections.count, count = std::ssize(numbers);
+  if (scan.cone)
+    throw FileError(source + ": shifts are of parallel beam; a matrix a view says them of cone beam");
+  if (count != views && count != 2 * views)
+    throw FileError(
+        fmt::format("{}: {} numbers for {} projections; one for each is needed (columns), or two "
+                    "(columns, rows)",
+                    source, count, views));
+  for (std::int64_t i = 0; i < count; ++i)
+    if (!std::isfinite(numbers[static_cast<std::size_t>(i)]))
+      throw FileError(fmt::format("{}: the shift of projection {} is {}; it must be finite", source,
+                                  i * views / count, numbers[static_cast<std::size_t>(i)]));
+  const auto width = static_cast<std::size_t>(count / views);
+  scan.shift_u.clear();
+  scan.shift_v.clear();
+  for (std::size_t i = 0; i < numbers.size(); i += width) {
+    scan.shift_u.push_back(numbers[i]);
+    if (width == 2) scan.shift_v.push_back(numbers[i + 1]);
+  }
+  scan.shifts_source = source;
 }
 
 void select_views(RawScan& scan, const ViewRanges& wanted) {
@@ -52,6 +97,10 @@ void select_views(RawScan& scan, const ViewRanges& wanted) {
   };
   if (scan.cone) keep(scan.cone->geometry.views);
   keep(scan.theta_deg);
+  keep(scan.shift_u);
+  keep(scan.shift_v);
+  keep(scan.beam_in_time.projections_at);
+  keep(scan.beam_in_time.projection_currents);
   keep(scan.view_files);
   for (SamplePositions& axis : scan.positions) keep(axis.at);
   scan.numbers = std::move(list);

@@ -43,6 +43,13 @@ struct SamplePositions {
   std::vector<double> at;  ///< one a view, as the views are
 };
 
+/// When frames were taken, and how bright the beam was. Each list is empty where nobody says it.
+struct BeamInTime {
+  std::vector<double> projections_at, flats_at;            ///< places in the order of frames
+  std::vector<double> projection_currents, flat_currents;  ///< of any unit
+  std::string currents;                                    ///< the file's name for them
+};
+
 struct RawScan {
   std::string format;  ///< "data-exchange", "nxtomo", "scan.json", "mha", "nrrd"
   std::int64_t rows = 0, columns = 0;
@@ -52,8 +59,9 @@ struct RawScan {
   Frames projections, flats, darks;              ///< flats and darks: count 0 where there are none
   std::string no_flats, no_darks;                ///< why there are none, for messages
   std::optional<double> flat_level, dark_level;  ///< where one number stands for them
-  bool counts = true;                            ///< false: line integrals
-  bool integer = false;                          ///< values are whole numbers
+  BeamInTime beam_in_time;
+  bool counts = true;    ///< false: line integrals
+  bool integer = false;  ///< values are whole numbers
   SampleValues values = SampleValues::counts;
   std::optional<SampleValues> stated;  ///< what the file or scan.json says that values are
   std::string values_source;           ///< who says it
@@ -63,6 +71,8 @@ struct RawScan {
   bool pitch_stated = false;
   std::string unit = "pixel";
   std::vector<SamplePositions> positions;
+  std::vector<double> shift_u, shift_v;  ///< by view, in `unit`, where options or scan.json state them
+  std::string shifts_source;             ///< who does; not empty: positions do not count
   std::vector<std::pair<std::int64_t, std::int64_t>> air_columns;  ///< inclusive
   std::vector<std::pair<std::string, std::filesystem::path>>
       files;                            ///< name in the hash, path; every file read
@@ -79,6 +89,15 @@ struct RawScan {
     return numbers.empty() ? view : numbers[static_cast<std::size_t>(view)];
   }
 };
+
+/// Where flats were taken, by the number of projections before each. Throws FileError, which begins with
+/// `name`, for a number that is not whole or beyond the projections.
+void place_flats(RawScan& scan, const std::vector<double>& projections_before, const std::string& name);
+
+/// Shifts that somebody states, one number (columns) or two (and rows) a view, one after another. Throws
+/// FileError, which begins with `source`, for another count of numbers or one that is not finite, and for
+/// cone beam.
+void state_shifts(RawScan& scan, const std::vector<double>& numbers, const std::string& source);
 
 /// Keeps the views of these ranges and their geometry. Throws InputError as checked_ranges.
 void select_views(RawScan& scan, const ViewRanges& ranges);

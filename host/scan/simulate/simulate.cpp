@@ -18,6 +18,8 @@
 #include <system_error>
 #include <thread>
 
+#include "host/scan/raw/raster_scan.hpp"
+#include "host/scan/raw/raw_scan.hpp"
 #include "host/scan/simulate/simulate_band_limit.hpp"
 #include "host/scan/simulate/simulate_cone.hpp"
 #include "host/scan/simulate/simulate_detector.hpp"
@@ -52,6 +54,11 @@ void check(const Phantom& phantom, const SimulateOptions& o) {
   if (!positive(o.pitch_v)) refuse("pitch in v", o.pitch_v, "a positive length");
   if (!(std::abs(o.detector_offset) < 0.5 * static_cast<double>(o.columns)))
     refuse("detector-offset", o.detector_offset, "columns that leave the axis on the detector");
+  if (!o.shifts.empty() && (o.cone || std::ssize(o.shifts) != o.angles))
+    refuse("shifts of so many views:", o.shifts.size(), "one for each view of parallel beam");
+  for (const auto& shift : o.shifts)
+    for (const double s : shift)
+      if (!std::isfinite(s)) refuse("shift", s, "a finite length");
   if (!not_negative(o.noise_sigma))
     refuse("noise-sigma", o.noise_sigma, "0 or a fraction of the largest line integral");
   if (o.median < 0 || (o.median > 0 && o.median % 2 == 0))
@@ -238,11 +245,19 @@ class Simulator {
       const ConeRays rays(phantom_, options_, static_cast<int>(k));
       for (std::size_t j = 0; j < v.size(); ++j)
         for (std::size_t i = 0; i < n; ++i) out[j * n + i] = rays(detector_.u[i], v[j]);
-    } else if (phantom_.view_integrals) phantom_.view_integrals(theta, detector_.u, v, out);
-    else
-      for (std::size_t j = 0; j < v.size(); ++j)
-        for (std::size_t i = 0; i < n; ++i)
-          out[j * n + i] = phantom_.line_integral(theta, detector_.u[i], v[j]);
+    } else {
+      // A sample that stands farther towards higher columns is seen there.
+      std::vector<double> us = detector_.u, vs{v.begin(), v.end()};
+      if (!options_.shifts.empty()) {
+        const auto [du, dv] = options_.shifts[static_cast<std::size_t>(k)];
+        for (double& u : us) u -= du;
+        for (double& height : vs) height -= dv;
+      }
+      if (phantom_.view_integrals) phantom_.view_integrals(theta, us, vs, out);
+      else
+        for (std::size_t j = 0; j < v.size(); ++j)
+          for (std::size_t i = 0; i < n; ++i) out[j * n + i] = phantom_.line_integral(theta, us[i], vs[j]);
+    }
     for (std::size_t j = 0; j < v.size(); ++j)
       if (out[j * n] != 0 || out[j * n + n - 1] != 0) truncated_[static_cast<std::size_t>(k)] = 1;
   }
@@ -280,6 +295,7 @@ std::string options_text(const Phantom& phantom, const SimulateOptions& o) {
                       {"gaussian", {o.gaussian_u, o.gaussian_v}},
                       {"binning", o.binning}};
   if (o.detector_offset != 0) text["detector_offset"] = o.detector_offset;
+  if (!o.shifts.empty()) text["shifts"] = o.shifts;
   if (o.cone)
     text["cone"] = {{"source_to_axis", o.cone->source_to_axis},
                     {"source_to_detector", o.cone->source_to_detector},
@@ -310,6 +326,16 @@ InputReport make_report(const Phantom& phantom, const SimulateOptions& o, double
 
 }  // namespace
 
+std::vector<std::array<double, 2>> read_shifts(const std::filesystem::path& path, std::int64_t views) {
+  io::RawScan raw;
+  raw.projections.count = views;
+  io::state_shifts(raw, io::read_numbers(path), path.string());
+  std::vector<std::array<double, 2>> shifts;
+  for (std::size_t k = 0; k < raw.shift_u.size(); ++k)
+    shifts.push_back({raw.shift_u[k], raw.shift_v.empty() ? 0.0 : raw.shift_v[k]});
+  return shifts;
+}
+
 ProjectionSet simulate(const Phantom& phantom, const SimulateOptions& options, const Progress& progress) {
   check(phantom, options);
   const unsigned threads = std::max(1u, std::thread::hardware_concurrency());
@@ -324,6 +350,12 @@ ProjectionSet simulate(const Phantom& phantom, const SimulateOptions& options, c
                      static_cast<double>(options.columns - 1) / 2 - options.detector_offset,
                      options.unit,
                      simulator.theta()};
+    for (const auto& [du, dv] : options.shifts) {
+      scan.geometry.column_shift.push_back(du / options.pitch_u);
+      scan.geometry.row_shift.push_back(dv / options.pitch_v);
+    }
+    for (std::vector<double>* shift : {&scan.geometry.column_shift, &scan.geometry.row_shift})
+      if (std::all_of(shift->begin(), shift->end(), [](double s) { return s == 0; })) shift->clear();
     if (options.cone) {
       scan.cone = cone_geometry_of(options);
       scan.geometry = parallel_limit(*scan.cone, options.columns, options.rows, options.unit);

@@ -80,6 +80,16 @@ void compare_extension(Compare& out, const nlohmann::json& g, const RowExtension
   out.number("options.geometry.extension.center", e.at("center").get<double>(), used.center);
 }
 
+void compare_shifts(Compare& out, const nlohmann::json& g, const char* name,
+                    const std::vector<double>& used) {
+  const auto noted = g.contains(name) ? g.at(name).get<std::vector<double>>() : std::vector<double>{};
+  const std::string member = std::string("options.geometry.") + name;
+  out.integer(("the number of shifts of " + member).c_str(), std::ssize(noted), std::ssize(used));
+  for (std::size_t k = 0; k < std::min(noted.size(), used.size()); ++k)
+    if (!same(noted[k], used[k]))
+      return out.differs(fmt::format("{}[{}] is {}, not {}", member, k, noted[k], used[k]));
+}
+
 void compare_geometry(Compare& out, const nlohmann::json& g, const ParallelGeometry& used) {
   out.integer("options.geometry.columns", g.at("columns").get<std::int64_t>(), used.columns);
   out.integer("options.geometry.rows", g.at("rows").get<std::int64_t>(), used.rows);
@@ -87,6 +97,8 @@ void compare_geometry(Compare& out, const nlohmann::json& g, const ParallelGeome
   out.number("options.geometry.pitch_v", g.at("pitch_v").get<double>(), used.pitch_v);
   out.number("options.geometry.center", g.at("center").get<double>(), used.center);
   compare_extension(out, g, used.extension);
+  compare_shifts(out, g, "column_shift", used.column_shift);
+  compare_shifts(out, g, "row_shift", used.row_shift);
   out.text("options.geometry.unit", g.at("unit").get<std::string>(), used.unit);
   const auto theta = g.at("theta_rad").get<std::vector<double>>();
   out.integer("the number of angles of options.geometry", static_cast<std::int64_t>(theta.size()),

@@ -10,21 +10,28 @@ namespace vdvr {
 
 CoveredChords covered_chords(const ParallelGeometry& g) {
   const auto columns = static_cast<std::size_t>(g.columns), views = g.theta_rad.size();
-  const auto [below, above] = seen_columns(g);
-  const double low = -below * g.pitch_u, high = above * g.pitch_u;
   CoveredChords out;
-  for (std::size_t i = 0; i < columns; ++i) out.u.push_back((static_cast<double>(i) - g.center) * g.pitch_u);
+  std::vector<std::pair<double, double>> strips;  // of t
+  for (std::size_t k = 0; k < views; ++k) {
+    for (std::size_t i = 0; i < columns; ++i)
+      out.u.push_back((static_cast<double>(i) - g.center_of_view(k)) * g.pitch_u);
+    ParallelGeometry one = g;
+    if (!g.column_shift.empty()) one.column_shift = {g.column_shift[k]};
+    const auto [below, above] = seen_columns(one);
+    strips.emplace_back(-below * g.pitch_u, above * g.pitch_u);
+  }
   out.first.assign(views * columns, -INFINITY);
   out.last.assign(views * columns, INFINITY);
   parallel_for(g.views(), {}, "chords", [&](std::int64_t view) {
     const auto j = static_cast<std::size_t>(view);
     double *first = out.first.data() + j * columns, *last = out.last.data() + j * columns;
     for (std::size_t k = 0; k < views; ++k) {
+      const auto [low, high] = strips[k];
       const double turn = g.theta_rad[k] - g.theta_rad[j], c = std::cos(turn), s = std::sin(turn);
       // Rays of this view, or seen from behind: they lie in its strip or beside it, whatever s.
       const bool along = std::abs(s) < 1e-12;
       for (std::size_t i = 0; i < columns; ++i) {
-        const double at = out.u[i] * c;
+        const double at = out.u[j * columns + i] * c;
         if (along) {
           if (!(at >= low && at <= high)) last[i] = -INFINITY;
           continue;

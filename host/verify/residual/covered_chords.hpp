@@ -10,7 +10,7 @@ namespace vdvr {
 
 /// Of the ray of view j and column i, x = u cos - s sin, y = u sin + s cos, the part from first to last.
 struct CoveredChords {
-  std::vector<double> u;            ///< by column, in world units from the axis
+  std::vector<double> u;            ///< [view][column], in world units from the axis
   std::vector<double> first, last;  ///< [view][column]; first >= last where nothing is covered
 
   [[nodiscard]] double length(std::size_t ray) const { return last[ray] - first[ray]; }

@@ -120,8 +120,7 @@ Residual residual(const ProjectionSet& scan, const MixedVolume& volume, const Ce
         const std::size_t at = out.index(view, row, i);
         out.lo[at] = down(rest - error);
         out.hi[at] = up(rest + error);
-        out.reach[at] =
-            up(along(c, s, chords.u[static_cast<std::size_t>(column)], chords.first[ray], chords.last[ray]));
+        out.reach[at] = up(along(c, s, chords.u[ray], chords.first[ray], chords.last[ray]));
       }
     });
   }

@@ -31,10 +31,11 @@ struct Pass {
       const Primitive& primitive = primitives[p];
       const double turn = g.theta_rad[first_view + p] - g.theta_rad[j], c = std::cos(turn),
                    s = std::sin(turn);
+      const double center = g.center_of_view(first_view + p);
       for (std::size_t i = 0; i < columns; ++i) {
         if (!(first[i] < last[i])) continue;
-        const double at = chords.u[i] * c, from = (at + first[i] * s) / g.pitch_u + g.center,
-                     to = (at + last[i] * s) / g.pitch_u + g.center;
+        const double at = chords.u[j * columns + i] * c, from = (at + first[i] * s) / g.pitch_u + center,
+                     to = (at + last[i] * s) / g.pitch_u + center;
         integral[i] += (last[i] - first[i]) * primitive.mean(from, to);
       }
       double slant = std::numeric_limits<double>::infinity();
@@ -85,8 +86,9 @@ RowIntegrals row_integrals(const ProjectionSet& row, const FieldOptions& field, 
 
   // docs/residual.md, "Bounds": the series' coefficients, where the rays' ends are seen, and the sums.
   out.error.resize(views * columns);
-  const double far = *std::max_element(longest.begin(), longest.end()) + std::abs(chords.u.front()) +
-                     std::abs(chords.u.back()),
+  const auto [leftmost, rightmost] = std::minmax_element(chords.u.begin(), chords.u.end());
+  const double far = *std::max_element(longest.begin(), longest.end()) + std::abs(*leftmost) +
+                     std::abs(*rightmost),
                misplaced = unit * (16 * far / g.pitch_u + 8 * static_cast<double>(columns)),
                density =
                    exact.rounding() + misplaced * slope + unit * static_cast<double>(views + 16) * largest;

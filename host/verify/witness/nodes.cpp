@@ -164,8 +164,8 @@ void VerifyNodes::make(const Part& part) {
           (grid_.origin[1] + static_cast<double>(part.first_y + tiles[b].s[1]) / n * grid_.spacing[1]) * s;
       // Fine column 0 of the table lies at the detector's edge, half a pixel before column 0, less the
       // padding.
-      const double column =
-          (t / g.pitch_u + g.center + 0.5) * static_cast<double>(fine_columns) + static_cast<double>(pad_);
+      const double column = (t / g.pitch_u + g.center_of_view(k) + 0.5) * static_cast<double>(fine_columns) +
+                            static_cast<double>(pad_);
       const double along_x = c * grid_.spacing[0] / n * scale, along_y = s * grid_.spacing[1] / n * scale;
       const double whole =
           std::floor(column + std::min(0.0, along_x * tile) + std::min(0.0, along_y * tile)) - 1;

@@ -7,6 +7,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <vector>
 
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
@@ -72,6 +74,62 @@ LongerRow longer_row(const ParallelGeometry& own, bool half, Padding padding) {
   return row;
 }
 
+// Of row v for the place y among n rows: 1/n (1 + 2 sum over m of cos(pi m (v + 1/2) / n) cos(pi m (y + 1/2)
+// / n)), term by term in long double, where common_heights.cpp has the closed form of its sum.
+std::vector<long double> series_at(std::int64_t n, long double y) {
+  constexpr long double pi = std::numbers::pi_v<long double>;
+  const auto rows = static_cast<long double>(n);
+  std::vector<long double> weights;
+  for (std::int64_t v = 0; v < n; ++v) {
+    long double sum = 1;
+    for (std::int64_t m = 1; m < n; ++m) {
+      const long double w = pi * static_cast<long double>(m) / rows;
+      sum += 2 * std::cos(w * (static_cast<long double>(v) + 0.5L)) * std::cos(w * (y + 0.5L));
+    }
+    weights.push_back(sum / rows);
+  }
+  return weights;
+}
+
+// Each view's rows at the heights that all views see.
+void to_common_heights(ProjectionSet& scan) {
+  ParallelGeometry& g = scan.geometry;
+  const long double top = *std::max_element(g.row_shift.begin(), g.row_shift.end()),
+                    bottom = *std::min_element(g.row_shift.begin(), g.row_shift.end());
+  std::int64_t common = g.rows;
+  while (common > 0 &&
+         static_cast<long double>(common) > static_cast<long double>(g.rows) - (top - bottom) + 1e-9L)
+    --common;
+  if (common < 1) throw InputError("rows_to_verify: views share no height");
+  const std::int64_t n = g.rows, U = g.columns;
+  SampleArray out(at(g.views() * common * U), scan.data.scratch(), "the projections at common heights");
+  parallel_for(g.views(), {}, "heights to verify", [&](std::int64_t k) {
+    for (std::int64_t j = 0; j < common; ++j) {
+      // From the middle of the rows to the middle of the heights.
+      const long double y = 0.5L * static_cast<long double>(n - 1) +
+                            (static_cast<long double>(j) - 0.5L * static_cast<long double>(common - 1)) +
+                            (static_cast<long double>(g.row_shift[at(k)]) - 0.5L * (top + bottom));
+      float* row = out.data() + (k * common + j) * U;
+      const float* view = scan.data.data() + k * n * U;
+      const auto whole = static_cast<std::int64_t>(std::llround(y));
+      if (std::abs(y - static_cast<long double>(whole)) <= 1e-9L) {
+        std::copy_n(view + std::clamp<std::int64_t>(whole, 0, n - 1) * U, U, row);
+        continue;
+      }
+      const std::vector<long double> weights = series_at(n, y);
+      for (std::int64_t u = 0; u < U; ++u) {
+        long double sum = 0;
+        for (std::int64_t v = 0; v < n; ++v)
+          sum += weights[at(v)] * static_cast<long double>(view[v * U + u]);
+        row[u] = static_cast<float>(sum);
+      }
+    }
+  });
+  scan.data = std::move(out);
+  g.rows = common;
+  g.extension.common_heights = true;
+}
+
 }  // namespace
 
 ProjectionSet rows_to_verify(ProjectionSet measured, const FieldOptions& field) {
@@ -80,6 +138,12 @@ ProjectionSet rows_to_verify(ProjectionSet measured, const FieldOptions& field) 
   ParallelGeometry& g = measured.geometry;
   if (g.extension.before > 0 || g.extension.after > 0)
     throw InputError("rows_to_verify: the scan's rows are longer than the detector already");
+  const bool heights = field.preparation.common_heights.value_or(false);
+  if (heights == g.row_shift.empty() || g.extension.common_heights)
+    throw InputError(
+        "rows_to_verify: heights are not as the certificate says: give the scan's own rows and shifts");
+  if (heights) to_common_heights(measured);
+  measured.report.preparation.common_heights = field.preparation.common_heights;
   measured.report.preparation.half_acquisition = field.preparation.half_acquisition;
   measured.report.preparation.padding = padding;
   g.extension.half_acquisition = field.preparation.half_acquisition;
@@ -100,7 +164,7 @@ ProjectionSet rows_to_verify(ProjectionSet measured, const FieldOptions& field) 
     }
   });
   measured.data = std::move(longer);
-  g.extension = {field.preparation.half_acquisition, padding, row.before, row.after, g.center};
+  g.extension = {field.preparation.half_acquisition, padding, row.before, row.after, g.center, heights};
   g.columns = wide;
   g.center += static_cast<double>(row.before);
   return measured;

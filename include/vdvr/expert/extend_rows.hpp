@@ -32,9 +32,9 @@ VDVR_API bool looks_half_acquired(const ParallelGeometry& geometry);
 /// whether the scan is one of half acquisition, looks_half_acquired() does; the sentence that says so is
 /// returned, else nothing. Rows that do not end in air where nothing is padded leave a note. Throws
 /// InputError for half acquisition of less than a full turn, with an axis off the detector, or with an
-/// overlap of less than 10 columns; for either of cone beam; ResourceError as read_scan. Cost: a pass over
-/// the data; memory: the longer rows beside the scan's, in `scratch` where they take more than an eighth of
-/// the limit.
+/// overlap of less than 10 columns; for half acquisition of a sample that moved along columns; for either of
+/// cone beam; ResourceError as read_scan. Cost: a pass over the data; memory: the longer rows beside the
+/// scan's, in `scratch` where they take more than an eighth of the limit.
 VDVR_API std::string extend_rows(ProjectionSet& scan, const Preparation& wanted,
                                  std::uint64_t max_memory_bytes = 0,
                                  const std::filesystem::path& scratch = {});

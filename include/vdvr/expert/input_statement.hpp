@@ -44,6 +44,8 @@ struct InputStatement {
   std::optional<double> flat;  ///< counts of the open beam, in place of flats
   std::optional<SampleValues> values;
   std::optional<AngleUnit> angle_unit;  ///< whatever the file of the angles says
+  /// Of an HDF5 file: the dataset of the beam's current in each frame, or "none"; empty: the usual one.
+  std::string beam_current{};
 
   [[nodiscard]] bool none() const { return *this == InputStatement{}; }
   bool operator==(const InputStatement&) const = default;

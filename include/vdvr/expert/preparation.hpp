@@ -12,6 +12,8 @@ namespace vdvr {
 
 /// Throws InputError naming the member for a value out of its range.
 VDVR_API void check_preparation(const Preparation& preparation);
+/// What a reader is asked for, to do what a certificate records and no more: it leaves nothing to the files.
+VDVR_API Preparation as_recorded(Preparation preparation);
 /// With the windows of stripes set for a detector of so many columns.
 VDVR_API Preparation for_columns(Preparation preparation, std::int64_t columns);
 /// "stripes 3,51,21; binning 2": every step with its numbers; "none".

@@ -60,6 +60,13 @@ struct Preparation {
   /// "Half acquisition"). Without a value, axis and arc decide when the scan is read.
   std::optional<bool> half_acquisition;
   Padding padding = Padding::none;
+  /// Whether flats taken at several places among the projections are interpolated in the order of frames, and
+  /// whether each frame is divided by the beam's current (docs/preparation.md, "Flats in time"). Without a
+  /// value: where the files of the scan tell. Recorded as true where it was done, else without a value.
+  std::optional<bool> flats_in_time, beam_current;
+  /// Rows of views that saw other heights are brought to those that all see (docs/geometry.md, "Shifts by
+  /// view"). Done without a value too; false leaves it to whoever reads the scan. Recorded as true.
+  std::optional<bool> common_heights;
 
   [[nodiscard]] bool none() const { return *this == Preparation{}; }
   bool operator==(const Preparation&) const = default;

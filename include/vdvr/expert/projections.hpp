@@ -1,7 +1,8 @@
 // A scan: projections with their geometry (docs/geometry.md). Parallel beam:
 //
 // Detector pixel (column i, row j) has its centre at integer (i, j). The rotation axis projects onto column
-// `center`. u = (i - center) pitch_u, v = (j - (rows - 1)/2) pitch_v, t = x cos(theta) + y sin(theta), z = v.
+// `center` (+ column_shift of the view). u = (i - center) pitch_u, v = (j - (rows - 1)/2) pitch_v, t = x
+// cos(theta) + y sin(theta), z = v.
 #pragma once
 
 #include <cstdint>
@@ -23,6 +24,7 @@ struct RowExtension {
   Padding padding = Padding::none;
   std::int64_t before = 0, after = 0;  ///< columns added on either side
   double center = 0;                   ///< column of the axis among the detector's own, where any were added
+  bool common_heights = false;         ///< views that saw other heights were brought to those that all see
   bool operator==(const RowExtension&) const = default;
 };
 
@@ -35,7 +37,16 @@ struct ParallelGeometry {
   std::string unit = "pixel";
   std::vector<double> theta_rad;  ///< one angle per view
   RowExtension extension{};       ///< `columns` and `center` count the columns that it added
+  /// By view how far the sample stood towards higher columns, in columns: view k sees the axis at column
+  /// center + column_shift[k]. Empty: it only turned.
+  std::vector<double> column_shift{};
+  /// The same towards higher rows, in rows, of rows as they were measured. `rows` are those of common heights
+  /// where `extension` says so; F is made of such rows alone.
+  std::vector<double> row_shift{};
 
+  [[nodiscard]] double center_of_view(std::size_t k) const {
+    return column_shift.empty() ? center : center + column_shift[k];
+  }
   [[nodiscard]] std::int64_t views() const { return static_cast<std::int64_t>(theta_rad.size()); }
   bool operator==(const ParallelGeometry&) const = default;
 };

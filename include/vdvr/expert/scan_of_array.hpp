@@ -2,6 +2,7 @@
 // Python module.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -22,6 +23,8 @@ struct ArrayScan {
   std::optional<double> center;          ///< column of the axis; none: found from the views, else the middle
   std::optional<bool> half_acquisition;  ///< none: as axis and arc say
   Padding padding = Padding::none;
+  /// By view how far the sample stood towards higher columns and rows, in `unit`; empty: it only turned.
+  std::vector<std::array<double, 2>> shifts{};
   double pitch_u = 1, pitch_v = 1;
   std::string unit = "pixel";
   std::string name = "array";  ///< what the certificate calls the input

@@ -21,6 +21,9 @@ struct ScanOptions {
   std::optional<std::filesystem::path> angles_file;  ///< for stacks and HDF5 files; degrees, one per view
   /// Overrides the file's; in columns of the projections as they are prepared, binned ones where they are.
   std::optional<double> center;
+  /// How far the sample stood in each view towards higher columns [and rows], in the scan's unit: a file of
+  /// numbers, or FILE.h5:/dataset; "none": it stood still, whatever the files say; empty: as they say.
+  std::string shifts;
   Preparation preparation;  ///< what is done to the projections
   InputStatement input;     ///< wins over what the files say
   /// Cone: by the distances of an NXtomo file, which is read as parallel beam otherwise. Refused where there

@@ -1,6 +1,7 @@
 // Projections of phantoms and volumes: exact line integrals where the phantom has them.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -100,13 +101,20 @@ struct SimulateOptions {
   // pitch.
   int median = 1;                         ///< side of a square median window, odd; 0 or 1: none
   double gaussian_u = 0, gaussian_v = 0;  ///< standard deviations of a Gaussian blur; 0: none
-  std::optional<ConeSetup> cone;          ///< pitches are then those on the detector
+  /// Of parallel beam, by view how far the sample stands towards higher columns and rows, in `unit`; empty:
+  /// it only turns.
+  std::vector<std::array<double, 2>> shifts{};
+  std::optional<ConeSetup> cone;  ///< pitches are then those on the detector
 
   int binning = 1;  ///< fine pixels per detector pixel, both ways; their mean is the pixel
 
   std::uint64_t max_memory_bytes = 0;  ///< 0: no limit
   std::filesystem::path scratch;       ///< as ScanOptions::scratch
 };
+
+/// Shifts of so many views from a text file: a number a view, or two (columns, rows). Throws FileError.
+VDVR_API std::vector<std::array<double, 2>> read_shifts(const std::filesystem::path& path,
+                                                        std::int64_t views);
 
 /// Views at k * arc / angles. Cost: angles * rows * columns (* binning^2, * 16 band-limited, *
 /// supersampling^2, or ^4 with a focal spot) line integrals

@@ -1,0 +1,28 @@
+// Views that saw the sample at other heights, brought to those that all of them see (docs/geometry.md,
+// "Shifts by view").
+//
+// With d_k the shifts along rows less the middle of the least and the largest, V rows measured and D the
+// range of d_k, there are V' = floor(V - D) common heights, and the row j of view k becomes
+//
+//   p'_k(j) = S_v[p_k]((V - V') / 2 + j + d_k),
+//
+// S_v the cosine series through the view's rows. Sums are taken in double precision and rounded once; a row
+// that is hit (to 1e-9 of a row) stays as it is. What is filtered, planned and certified is an ordinary scan
+// of these rows, whose middle is z = 0.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+
+#include "vdvr/expert/preparation_steps.hpp"
+#include "vdvr/expert/projections.hpp"
+
+namespace vdvr {
+
+/// In place, and recorded in geometry and report. Does nothing where no rows are shifted, or where `wanted`
+/// says that heights are left as seen. Throws InputError where views share no height, ResourceError as
+/// read_scan. Cost: views * columns * rows^2 multiply-adds.
+void common_heights(ProjectionSet& scan, const Preparation& wanted, std::uint64_t max_memory_bytes,
+                    const std::filesystem::path& scratch);
+
+}  // namespace vdvr
