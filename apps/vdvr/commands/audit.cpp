@@ -135,7 +135,7 @@ std::string verdict(const fs::path& path, const AuditFigures& f) {
       path.string(), e, f.lower, f.why_no_upper);
 }
 
-void declare(Arguments& args) {
+void declare_audit(Arguments& args) {
   args.positional("VOLUME", "a uniform volume of any program: MHA, NRRD, NPY, FILE.h5:/dataset, TIFF slices")
       .value("projections", "SCAN", "the projections that it was reconstructed from")
       .value("interpolate", "nearest|linear|cubic", "what it is between its samples (default linear)")
@@ -154,7 +154,7 @@ void declare(Arguments& args) {
 }  // namespace
 
 int audit_command(Arguments& args) {
-  declare(args);
+  declare_audit(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
   const fs::path path = args.path("VOLUME"), projections = args.path("projections"),

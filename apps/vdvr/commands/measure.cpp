@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 namespace vdvr::cli {
 namespace {
 
-void declare(Arguments& args) {
+void declare_measure(Arguments& args) {
   args.positional("FILE", "a certified volume")
       .group("What is measured")
       .value("above", "C", "the volume where F is at least C, and its share of the region")
@@ -284,7 +284,7 @@ class Report {
 }  // namespace
 
 int measure_command(Arguments& args) {
-  declare(args);
+  declare_measure(args);
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
   const fs::path path = args.path("FILE");

@@ -77,13 +77,13 @@ LongerRow longer_row(const ParallelGeometry& own, bool half, Padding padding) {
 // Of row v for the place y among n rows: 1/n (1 + 2 sum over m of cos(pi m (v + 1/2) / n) cos(pi m (y + 1/2)
 // / n)), term by term in long double, where common_heights.cpp has the closed form of its sum.
 std::vector<long double> series_at(std::int64_t n, long double y) {
-  constexpr long double pi = std::numbers::pi_v<long double>;
+  constexpr long double half_turn = std::numbers::pi_v<long double>;
   const auto rows = static_cast<long double>(n);
   std::vector<long double> weights;
   for (std::int64_t v = 0; v < n; ++v) {
     long double sum = 1;
     for (std::int64_t m = 1; m < n; ++m) {
-      const long double w = pi * static_cast<long double>(m) / rows;
+      const long double w = half_turn * static_cast<long double>(m) / rows;
       sum += 2 * std::cos(w * (static_cast<long double>(v) + 0.5L)) * std::cos(w * (y + 0.5L));
     }
     weights.push_back(sum / rows);
