@@ -28,6 +28,26 @@ double mean_of(const std::vector<double>& values) {
 
 }  // namespace
 
+std::vector<std::vector<std::int64_t>> runs_of_flats(const io::RawScan& raw) {
+  const io::BeamInTime& beam = raw.beam_in_time;
+  std::vector<std::int64_t> order(at(raw.flats.count));
+  std::iota(order.begin(), order.end(), std::int64_t{0});
+  if (beam.flats_at.empty() || beam.projections_at.empty()) return {order};
+  const auto place = [&](std::int64_t flat) { return beam.flats_at[at(flat)]; };
+  std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return place(a) < place(b); });
+  std::vector<double> projections = beam.projections_at;
+  std::sort(projections.begin(), projections.end());
+  const auto seen_before = [&](std::int64_t flat) {
+    return std::upper_bound(projections.begin(), projections.end(), place(flat));
+  };
+  std::vector<std::vector<std::int64_t>> runs;
+  for (const std::int64_t flat : order) {
+    if (runs.empty() || seen_before(runs.back().back()) != seen_before(flat)) runs.emplace_back();
+    runs.back().push_back(flat);
+  }
+  return runs;
+}
+
 FlatsInTime::FlatsInTime(const io::RawScan& raw, const Preparation& wanted) : raw_(raw) {
   const io::BeamInTime& beam = raw.beam_in_time;
   const bool frames = raw.counts && !raw.flat_level && raw.flats.count > 0;
@@ -48,29 +68,22 @@ FlatsInTime::FlatsInTime(const io::RawScan& raw, const Preparation& wanted) : ra
     require_currents(beam, beam.flat_currents, "flat");
     mean_current_ = mean_of(beam.flat_currents);
   }
-  std::vector<std::int64_t> order(at(frames ? raw.flats.count : 0));
-  std::iota(order.begin(), order.end(), std::int64_t{0});
-  if (ordered && wanted.flats_in_time.value_or(true)) {
-    const auto place = [&](std::int64_t flat) { return beam.flats_at[at(flat)]; };
-    std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return place(a) < place(b); });
-    std::vector<double> projections = beam.projections_at;
-    std::sort(projections.begin(), projections.end());
-    for (const std::int64_t flat : order) {
-      const bool apart =
-          runs_.empty() ||
-          std::upper_bound(projections.begin(), projections.end(), place(runs_.back().flats.back())) !=
-              std::upper_bound(projections.begin(), projections.end(), place(flat));
-      if (apart) runs_.emplace_back();
-      runs_.back().flats.push_back(flat);
-    }
-    for (Run& run : runs_) {
-      for (const std::int64_t flat : run.flats) run.at += place(flat);
-      run.at /= static_cast<double>(run.flats.size());
-    }
-    in_time_ = runs_.size() > 1;
+  if (!frames) return;
+  std::vector<std::vector<std::int64_t>> runs = runs_of_flats(raw);
+  in_time_ = ordered && wanted.flats_in_time.value_or(true) && runs.size() > 1;
+  if (!in_time_) {
+    if (!by_current_) return;
+    std::vector<std::int64_t> all(at(raw.flats.count));
+    std::iota(all.begin(), all.end(), std::int64_t{0});
+    runs = {std::move(all)};
   }
-  if (!in_time_) runs_.clear();
-  if (runs_.empty() && by_current_) runs_.push_back({order, 0});
+  for (std::vector<std::int64_t>& flats : runs) {
+    double place = 0;
+    if (in_time_)
+      for (const std::int64_t flat : flats)
+        place += beam.flats_at[at(flat)] / static_cast<double>(flats.size());
+    runs_.push_back({std::move(flats), place});
+  }
 }
 
 std::vector<std::string> FlatsInTime::record(Preparation& recorded) const {

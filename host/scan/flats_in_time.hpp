@@ -18,6 +18,9 @@
 
 namespace vdvr {
 
+/// The flats of each run, in the order of frames; all of them as one run where no order is known.
+std::vector<std::vector<std::int64_t>> runs_of_flats(const io::RawScan& raw);
+
 class FlatsInTime {
  public:
   /// Looks at places and currents, and reads nothing. Throws InputError, which names what is wrong, where

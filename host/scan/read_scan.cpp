@@ -385,7 +385,8 @@ std::optional<LineIntegralNoise> read_line_noise(const fs::path& path, const Sca
   bool folder = false;
   const io::RawScan raw = open_described(path, options, folder);
   if (!raw.counts) return std::nullopt;
-  std::optional<LineIntegralNoise> noise = photon_transfer(raw.flats, raw.darks, raw.rows, raw.columns);
+  std::optional<LineIntegralNoise> noise =
+      photon_transfer(raw.flats, raw.darks, raw.rows, raw.columns, runs_of_flats(raw));
   if (noise) noise = binned(*noise, raw.rows, raw.columns, options.preparation.binning);
   return noise;
 }

@@ -72,6 +72,33 @@ BOOST_AUTO_TEST_CASE(flats_tell_photons_gain_and_read_noise) {
   }
 }
 
+// Between two runs the beam's profile turned around: within them it did not.
+BOOST_AUTO_TEST_CASE(drift_between_runs_is_no_noise) {
+  Camera camera;
+  camera.offset = 0;
+  std::vector<std::vector<double>> frames;
+  std::mt19937_64 random(5);
+  for (int k = 0; k < 20; ++k) {
+    std::vector<double> frame;
+    for (std::int64_t i = 0; i < rows * columns; ++i) {
+      const double across = static_cast<double>(i % columns) / (columns - 1), tilt = k < 10 ? 0.1 : -0.1;
+      const double seen = camera.photons * (1 + tilt * (2 * across - 1));
+      frame.push_back(camera.gain * static_cast<double>(std::poisson_distribution<long>(seen)(random)));
+    }
+    frames.push_back(std::move(frame));
+  }
+  std::vector<std::vector<std::int64_t>> runs(2);
+  for (std::int64_t k = 0; k < 20; ++k) runs[k < 10 ? 0 : 1].push_back(k);
+  const io::Frames flats = frames_of(frames), none{};
+  const auto within = photon_transfer(flats, none, rows, columns, runs);
+  BOOST_TEST_REQUIRE(within.has_value());
+  BOOST_TEST(std::abs(within->photons / camera.photons - 1) <= 0.05);
+  // Taken as one run it is noise, and far more of it: the test could fail.
+  const auto as_one = photon_transfer(flats, none, rows, columns);
+  BOOST_TEST_REQUIRE(as_one.has_value());
+  BOOST_TEST(as_one->photons < 0.7 * camera.photons);
+}
+
 BOOST_AUTO_TEST_CASE(flats_that_tell_nothing_are_said_to) {
   const Camera camera;
   BOOST_TEST(!photon_transfer(frames_of(camera, 4, true, 1), frames_of(camera, 4, false, 2), rows, columns));

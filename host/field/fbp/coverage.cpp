@@ -47,8 +47,14 @@ Coverage::Coverage(const ParallelGeometry& g)
   inner_ = std::min(below, above);
   if (!(inner_ > 0))
     throw InputError(
-        fmt::format("the centre {} does not fall on the detector's {} columns{}; correct `center`", g.center,
-                    g.columns, g.column_shift.empty() ? "" : " in every view"));
+        g.column_shift.empty()
+            ? fmt::format("the centre {} does not fall on the detector's {} columns; correct `center`",
+                          g.center, g.columns)
+            : fmt::format(
+                  "the centre {}, with shifts of {:g} to {:g} columns, does not fall on the detector's {} "
+                  "columns in every view; correct `center` or `shifts`, which are lengths",
+                  g.center, *std::min_element(g.column_shift.begin(), g.column_shift.end()),
+                  *std::max_element(g.column_shift.begin(), g.column_shift.end()), g.columns));
   ParallelGeometry one = g;
   for (std::size_t k = 0; k < g.theta_rad.size(); ++k) {
     const double c = std::cos(g.theta_rad[k]), s = std::sin(g.theta_rad[k]);
