@@ -15,7 +15,10 @@ constexpr double open_share = 0.1;
 // This share of what may stay undecided is aimed at: one pass mostly does, since parts are halved a little
 // too often.
 constexpr double margin = 1.1;
-constexpr int most_passes = 4;
+// What a pass may let the undecided fall by: only then is it known what the bound leaves open, which may be
+// far more than what geometry may.
+constexpr double most_at_once = 12;
+constexpr int most_passes = 6;
 
 double above(double x) { return std::nextafter(x, infinity); }
 double below(double x) { return std::nextafter(x, -infinity); }
@@ -214,8 +217,8 @@ VolumeMeasure measure_volume(const Field& field, const ValueRange& range, const 
   };
   const auto edge_excess = [&] { return s.region.width() / (options.share * s.region.hi); };
   for (int pass = 0; pass < most_passes && (excess() > 1 || edge_excess() > 1); ++pass) {
-    const Fineness next{volume_for(s.undecided, excess(), unit), volume_for(s.edge, edge_excess(), unit),
-                        fineness.halvings + 9};
+    const Fineness next{volume_for(s.undecided, std::min(excess(), most_at_once), unit),
+                        volume_for(s.edge, edge_excess(), unit), fineness.halvings + 9};
     if (pass == 0) fineness = next;
     else
       fineness = {std::min(next.volume, (excess() > 1 ? 0.5 : 1.0) * fineness.volume),
