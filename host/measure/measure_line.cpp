@@ -105,7 +105,7 @@ LineMeasure measure_line(const Field& field, const Vec3& p, const Vec3& q, const
 
   Stretches stretches(options.value.value_or(0));
   std::int64_t next = 0;
-  rays.walk_between(ray, first, last, [&](const RayPiece& piece) {
+  rays.walk_between(ray, first, last, [&, first = first, last = last](const RayPiece& piece) {
     if (!(piece.last > piece.first)) return true;
     for (; next < options.samples; ++next) {
       const double place = out.length * static_cast<double>(next) / static_cast<double>(options.samples - 1),

@@ -368,6 +368,71 @@ void add_differences(VerifyResult& r) {
                     r.differences[i]);
 }
 
+// The brick with the largest total, and one that errs by more than the certificate says of it; -1: none.
+struct WorstBricks {
+  std::int64_t worst = -1, broken = -1;
+};
+
+WorstBricks sum_up(const std::vector<TestedBricks::Brick>& bricks, const Certificate& stored,
+                   const SamplerTerms& sampler, VerifyResult& result) {
+  WorstBricks out;
+  for (std::size_t i = 0; i < bricks.size(); ++i) {
+    const TestedBricks::Brick& b = bricks[i];
+    if (b.total < 0) continue;
+    ++result.bricks_tested;
+    result.measured_max = std::max(result.measured_max, b.error);
+    if (b.again) ++result.bricks_finer;
+    result.finest_rate = std::max(result.finest_rate, b.tried);
+    // With a window a brick of which build tested nothing may have cells here, whose range is widened by
+    // more.
+    const bool promised = !stored.brick_totals.empty() && (stored.brick_totals[i] >= 0 || !stored.window);
+    if (promised) {
+      const double bound = static_cast<double>(stored.brick_totals[i]) + stored.budget.arithmetic.value;
+      // Between gold nodes the certificate's bound holds with the sampler's rounding.
+      if (!(b.least <= bound) || !(b.finer <= bound + sampler.buffer.value))
+        out.broken = static_cast<std::int64_t>(i);
+    }
+    if (sampler.image3d)
+      result.total_image3d = std::max(result.total_image3d.value_or(0),
+                                      b.total + static_cast<double>(sampler.image3d_by_brick[i]));
+    if (b.total <= result.measured_total && out.worst >= 0) continue;
+    result.measured_total = b.total;
+    out.worst = static_cast<std::int64_t>(i);
+  }
+  return out;
+}
+
+// What F at points says of a certificate whose bricks hold.
+void look_at_points(TotalAttack& attack, const ExactField& exact, const VerifyField& field,
+                    const Progress& progress, VerifyResult& result) {
+  const TotalAttack::Outcome points = attack.run(exact, progress);
+  result.points_evaluated = points.points;
+  result.worst_share = points.worst_share;
+  if (result.holds && !points.failure.empty()) {
+    result.holds = false;
+    result.failure = points.failure;
+  }
+  const FieldPoints::Outcome seen = FieldPoints::compare(exact, field.seen(), progress);
+  result.field_points = seen.points;
+  result.field_share = seen.worst_share;
+  if (!seen.failure.empty()) {
+    result.holds = false;
+    result.failure = seen.failure;
+  }
+}
+
+void look_at_seams(const MixedVolume& volume, VerifyResult& result) {
+  const Seams seams = compare_seams(volume);
+  result.seams = seams.different;
+  if (seams.different == 0) return;
+  result.holds = false;
+  result.failure += fmt::format(
+      "{}{} samples that two bricks share differ, first at ({:.6g}, {:.6g}, {:.6g}) between bricks {} "
+      "and {}",
+      result.failure.empty() ? "" : "; ", seams.different, seams.at[0], seams.at[1], seams.at[2],
+      seams.bricks[0], seams.bricks[1]);
+}
+
 }  // namespace
 
 VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume& volume,
@@ -412,31 +477,8 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
   tested.sweep(selected, points_of_field.flags(), result);
   tested.settle(result);
 
-  std::int64_t worst = -1, broken = -1;
   const std::vector<TestedBricks::Brick>& bricks = tested.bricks();
-  for (std::size_t i = 0; i < bricks.size(); ++i) {
-    const TestedBricks::Brick& b = bricks[i];
-    if (b.total < 0) continue;
-    ++result.bricks_tested;
-    result.measured_max = std::max(result.measured_max, b.error);
-    if (b.again) ++result.bricks_finer;
-    result.finest_rate = std::max(result.finest_rate, b.tried);
-    // With a window a brick of which build tested nothing may have cells here, whose range is widened by
-    // more.
-    const bool promised = !stored.brick_totals.empty() && (stored.brick_totals[i] >= 0 || !stored.window);
-    if (promised) {
-      const double bound = static_cast<double>(stored.brick_totals[i]) + stored.budget.arithmetic.value;
-      // Between gold nodes the certificate's bound holds with the sampler's rounding.
-      if (!(b.least <= bound) || !(b.finer <= bound + sampler.buffer.value))
-        broken = static_cast<std::int64_t>(i);
-    }
-    if (sampler.image3d)
-      result.total_image3d = std::max(result.total_image3d.value_or(0),
-                                      b.total + static_cast<double>(sampler.image3d_by_brick[i]));
-    if (b.total <= result.measured_total && worst >= 0) continue;
-    result.measured_total = b.total;
-    worst = static_cast<std::int64_t>(i);
-  }
+  const auto [worst, broken] = sum_up(bricks, stored, sampler, result);
   if (worst < 0) {
     result.failure = "no tested brick holds a covered gold cell";
     add_differences(result);
@@ -463,36 +505,12 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
     result.failure = fmt::format("|V - F| exceeds the certificate's bound {:.6g} of one brick, {}",
                                  stored.brick_totals[at(broken)], place_text(place(broken)));
   }
-  const TotalAttack::Outcome points = attack.run(exact, progress);
-  result.points_evaluated = points.points;
-  result.worst_share = points.worst_share;
-  if (result.holds && !points.failure.empty()) {
-    result.holds = false;
-    result.failure = points.failure;
-  }
-  const FieldPoints::Outcome seen = FieldPoints::compare(exact, field.seen(), progress);
-  result.field_points = seen.points;
-  result.field_share = seen.worst_share;
-  if (!seen.failure.empty()) {
-    result.holds = false;
-    result.failure = seen.failure;
-  }
+  look_at_points(attack, exact, field, progress, result);
   // Rates that name no gold have been found already.
   if (result.differences.empty())
     also(compare_terms(device, scan, exact, volume, stored, selected, options.exhaustive, progress));
   add_differences(result);
-  if (options.exhaustive) {
-    const Seams seams = compare_seams(volume);
-    result.seams = seams.different;
-    if (seams.different > 0) {
-      result.holds = false;
-      result.failure += fmt::format(
-          "{}{} samples that two bricks share differ, first at ({:.6g}, {:.6g}, {:.6g}) between bricks {} "
-          "and {}",
-          result.failure.empty() ? "" : "; ", seams.different, seams.at[0], seams.at[1], seams.at[2],
-          seams.bricks[0], seams.bricks[1]);
-    }
-  }
+  if (options.exhaustive) look_at_seams(volume, result);
   return result;
 }
 

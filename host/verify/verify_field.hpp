@@ -117,6 +117,8 @@ class VerifyField {
     int first, last, in_first, in_last;
   };
   [[nodiscard]] Layers covered_cells(const Shape& shape) const;
+  [[nodiscard]] std::vector<double> constants_of(const Batch& batch, const Shape& shape,
+                                                 const std::vector<cl_float8>& rows) const;
   void measure(const Batch& batch, const Shape& shape, const opencl::DeviceArray<float>& values,
                const std::function<void(const Piece&)>& on_piece);
   void look(const Batch& batch, const Shape& shape, const opencl::DeviceArray<float>& values);

@@ -111,6 +111,29 @@ std::int64_t tested_nodes(const std::uint32_t* bits, std::int64_t cells, std::in
   return nodes;
 }
 
+// The largest error and total of a piece's columns, `cells` x `cells`.
+void take_worst(VerifyField::Piece& b, std::int64_t cells) {
+  float best = -1;
+  for (std::int64_t j = 0; j < cells * cells; ++j) {
+    const VerifyField::Column& c = b.columns[at(j)];
+    if (c.total < 0) continue;
+    b.error = std::max(b.error, b.unit * static_cast<double>(c.error));
+    if (c.total <= best) continue;
+    best = c.total;
+    b.worst_cell = {b.first_cell[0] + j % cells, b.first_cell[1] + j / cells, b.first_cell[2] + c.worst_z};
+  }
+  if (best >= 0) b.total = b.unit * static_cast<double>(best) + b.constant;
+}
+
+std::vector<VerifyField::Column> columns_of(const std::vector<cl_int4>& raw) {
+  static_assert(sizeof(cl_int4) == sizeof(VerifyField::Column));
+  std::vector<VerifyField::Column> out(raw.size());
+  std::transform(raw.begin(), raw.end(), out.begin(), [](const cl_int4& c) {
+    return VerifyField::Column{std::bit_cast<float>(c.s[0]), std::bit_cast<float>(c.s[1]), c.s[2], 0};
+  });
+  return out;
+}
+
 }  // namespace
 
 // The first and the last layer of cells along z that meet the covered heights, and those that lie in them.
@@ -127,6 +150,23 @@ VerifyField::Layers VerifyField::covered_cells(const Shape& s) const {
     l.in_last = k;
   }
   return l;
+}
+
+// Of each brick of the batch what its field may err by between nodes, from its largest fourth differences.
+std::vector<double> VerifyField::constants_of(const Batch& batch, const Shape& s,
+                                              const std::vector<cl_float8>& rows) const {
+  const std::int64_t side = s.cells + 1;
+  std::vector<double> constants;
+  for (std::size_t i = 0; i < batch.items.size(); ++i) {
+    std::array<double, 6> largest{};
+    for (std::int64_t y = 0; y < side; ++y)
+      for (std::size_t q = 0; q < 6; ++q)
+        largest[q] = std::max(
+            largest[q], unit_ * static_cast<double>(rows[at(static_cast<std::int64_t>(i) * side + y)].s[q]));
+    const FieldBounds& bounds = bounds_of(s, batch.bricks[i]);
+    constants.push_back(brick_constant(bounds, largest) + bounds.arithmetic);
+  }
+  return constants;
 }
 
 void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::DeviceArray<float>& values,
@@ -178,18 +218,10 @@ void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::Devi
   fourths(opencl::shared_groups(state_.info, {1, count(side), count(n)}), fourth.buffer(), values.buffer(),
           tested.buffer(), grid, items.buffer(), first.buffer(), pieces, opencl::shared_room(state_.info));
 
-  const std::vector<cl_float8> rows = fourth.to_host();
-  std::vector<double> constants(at(n));
-  std::vector<float> widening(at(n));
-  for (std::int64_t i = 0; i < n; ++i) {
-    std::array<double, 6> largest{};
-    for (std::int64_t y = 0; y < side; ++y)
-      for (std::size_t q = 0; q < 6; ++q)
-        largest[q] = std::max(largest[q], unit_ * static_cast<double>(rows[at(i * side + y)].s[q]));
-    const FieldBounds& bounds = bounds_of(s, batch.bricks[at(i)]);
-    constants[at(i)] = brick_constant(bounds, largest) + bounds.arithmetic;
-    widening[at(i)] = static_cast<float>(constants[at(i)] / unit_ * (1 + 1e-6));
-  }
+  const std::vector<double> constants = constants_of(batch, s, fourth.to_host());
+  std::vector<float> widening;
+  for (const double constant : constants)
+    widening.push_back(static_cast<float>(constant / unit_ * (1 + 1e-6)));
   const opencl::DeviceArray<float> device_widening(state_, std::span<const float>(widening),
                                                    "constants of pieces");
 
@@ -200,14 +232,7 @@ void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::Devi
         bits.buffer(), error.buffer(), values.buffer(), tested.buffer(), grid, items.buffer(), first.buffer(),
         device_widening.buffer(), pieces, opencl::shared_room(state_.info));
 
-  std::vector<Column> host(at(n * s.cells * s.cells));
-  {
-    const std::vector<cl_int4> raw = columns.to_host();
-    static_assert(sizeof(cl_int4) == sizeof(Column));
-    std::transform(raw.begin(), raw.end(), host.begin(), [](const cl_int4& c) {
-      return Column{std::bit_cast<float>(c.s[0]), std::bit_cast<float>(c.s[1]), c.s[2], 0};
-    });
-  }
+  const std::vector<Column> host = columns_of(columns.to_host());
   const std::vector<cl_uint> host_bits = bits.to_host();
   for (std::int64_t i = 0; i < n; ++i) {
     Piece b;
@@ -222,17 +247,7 @@ void VerifyField::measure(const Batch& batch, const Shape& s, const opencl::Devi
     const std::uint32_t* flags = host_bits.data() + i * s.cells * s.cells * s.words;
     for (std::int64_t w = 0; w < s.cells * s.cells * s.words; ++w) b.cells += std::popcount(flags[w]);
     if (b.cells > 0) b.nodes = tested_nodes(flags, s.cells, s.words);
-    float best = -1;
-    for (std::int64_t j = 0; j < s.cells * s.cells; ++j) {
-      const Column& c = b.columns[at(j)];
-      if (c.total < 0) continue;
-      b.error = std::max(b.error, unit_ * static_cast<double>(c.error));
-      if (c.total <= best) continue;
-      best = c.total;
-      b.worst_cell = {b.first_cell[0] + j % s.cells, b.first_cell[1] + j / s.cells,
-                      b.first_cell[2] + c.worst_z};
-    }
-    if (best >= 0) b.total = unit_ * static_cast<double>(best) + b.constant;
+    take_worst(b, s.cells);
     on_piece(b);
   }
 }

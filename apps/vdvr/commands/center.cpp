@@ -91,6 +91,27 @@ void print_found(const std::optional<CenterEstimate>& found, int binning) {
                100 * w.quality);
 }
 
+Search search_of(const Arguments& args, const std::filesystem::path& path, const CommonOptions& common) {
+  Search wanted;
+  wanted.field = field_options(args);
+  // The axis is looked for in the views as they are.
+  wanted.field.preparation.half_acquisition = false;
+  wanted.field.preparation.padding = Padding::none;
+  wanted.count = args.integer_or("count", wanted.count, 3, 99);
+  if (wanted.count % 2 == 0)
+    throw InputError(
+        fmt::format("--count: {} is even; the slice in the middle needs an odd one", wanted.count));
+  if (args.has("step")) wanted.step = args.positive_or("step", 0);
+  if (!args.has("output"))
+    refuse(args, {"row", "step", "count"}, "is for the sheet, which --output asks for");
+  else {
+    if (args.path("output").extension() != ".png")
+      throw InputError(fmt::format("{}: write the sheet as .png", args.text("output")));
+    check_output(args.path("output"), common.force, {path});
+  }
+  return wanted;
+}
+
 }  // namespace
 
 int center_command(Arguments& args) {
@@ -106,23 +127,8 @@ int center_command(Arguments& args) {
   if (!args.parse()) return 0;
   const CommonOptions common = common_options(args);
   const auto path = args.path("IN");
-  Search wanted;
-  wanted.field = field_options(args);
-  // The axis is looked for in the views as they are.
-  wanted.field.preparation.half_acquisition = false;
-  wanted.field.preparation.padding = Padding::none;
-  wanted.count = args.integer_or("count", wanted.count, 3, 99);
-  if (wanted.count % 2 == 0)
-    throw InputError(
-        fmt::format("--count: {} is even; the slice in the middle needs an odd one", wanted.count));
-  if (args.has("step")) wanted.step = args.positive_or("step", 0);
+  Search wanted = search_of(args, path, common);
   const bool draws = args.has("output");
-  if (!draws) refuse(args, {"row", "step", "count"}, "is for the sheet, which --output asks for");
-  if (draws) {
-    if (args.path("output").extension() != ".png")
-      throw InputError(fmt::format("{}: write the sheet as .png", args.text("output")));
-    check_output(args.path("output"), common.force, {path});
-  }
 
   ProgressLine progress(args.who(), common.quiet);
   const ProjectionSet scan = load_any_scan(path, args, wanted.field, progress.callback());
