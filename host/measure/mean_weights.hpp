@@ -74,7 +74,8 @@ double volume_by_lines(const MeasuredRegion& region);
 namespace vdvr {
 
 /// In mean_of_scan.cpp. Cost: MeanWeights::of_view of every view, and a pass over the scan. Memory: its
-/// tables, and what it takes for each of 16 groups of views. The same on every machine. Throws as MeanWeights.
+/// tables, and what it takes for each of 16 groups of views. The same on every machine. Throws as
+/// MeanWeights.
 MeanOfScan mean_of_scan(const ProjectionSet& scan, const FieldOptions& field, const MeasuredRegion& region,
                         const MeanNoise& noise, std::uint64_t max_memory_bytes, const Progress& progress);
 
