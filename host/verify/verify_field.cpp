@@ -177,6 +177,11 @@ void VerifyField::run(const std::vector<std::uint8_t>& selected, std::span<const
     for (const int rate : rates) {
       std::vector<std::uint8_t> wanted = part.selected;
       for (std::size_t i = 0; i < wanted.size(); ++i) wanted[i] = wanted[i] && wants(i, rate);
+      std::vector<std::uint8_t> unseen = wanted;
+      const auto see = [&](const Piece& piece) {
+        unseen[at(piece.brick)] = 0;
+        on_piece(piece);
+      };
       const BoxOfBricks box(volume_.bricks(), wanted);
       if (box.bricks > 0) {
         Shape s = shape_at(rate, 2 * box.bricks > box.size(), part.nodes);
@@ -193,10 +198,13 @@ void VerifyField::run(const std::vector<std::uint8_t>& selected, std::span<const
           s.nz = std::min(layers * s.cells, volume_.grid.cells[2] * s.rate - s.slab_z * s.cells) + 1 +
                  2 * verify_halo;
           s.z_padded = up(s.nz, 16);
-          run_slab(s, slabs[i].blocks, wanted, on_piece);
+          run_slab(s, slabs[i].blocks, wanted, see);
           tick(static_cast<double>(i + 1) / static_cast<double>(slabs.size()));
         }
       }
+      // At the rim coarse cells may be tested where no fine one is: that is an answer too.
+      for (std::size_t i = 0; i < unseen.size(); ++i)
+        if (unseen[i] != 0) on_piece(Piece{.brick = static_cast<std::int64_t>(i), .rate = rate});
       ++done;
     }
   }

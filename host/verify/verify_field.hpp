@@ -42,7 +42,7 @@ class VerifyField {
     double total = -1;                  ///< bound of |V - F| on the tested cells; negative: none
     Index3 worst_cell{0, 0, 0};         ///< gold cell inside the brick
     double constant = 0;                ///< what `total` holds beside a column's own total
-    std::span<const Column> columns;    ///< [y][x] of the piece's side; total < 0: untested
+    std::span<const Column> columns{};  ///< [y][x] of the piece's side; total < 0: untested
     double unit = 1;                    ///< of what columns hold
     double arithmetic = 0;              ///< what F may err at a node
   };
@@ -68,7 +68,8 @@ class VerifyField {
 
   /// Measures bricks on gold of the rates, ascending; more than one only where each is a multiple of
   /// `across()`. `wants` is asked of each selected brick at each rate, and at a rate only when all pieces of
-  /// the one before are known. Calls back once for each piece, in no particular order.
+  /// the one before are known. Calls back once for each piece, in no particular order, and for a brick of
+  /// which gold of that rate tests no cell with an empty one.
   void run(const std::vector<std::uint8_t>& selected, std::span<const int> rates,
            const std::function<bool(std::size_t brick, int rate)>& wants,
            const std::function<void(const Piece&)>& on_piece, const Progress& progress);
