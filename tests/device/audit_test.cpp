@@ -79,8 +79,11 @@ void check_names(const Case& c, const Volume& v, const std::vector<std::string>&
   BOOST_TEST_CONTEXT(c.name << ": " << all(r)) {
     BOOST_TEST(r.words.size() == words.size());
     for (const std::string& w : words) BOOST_TEST(says(r, w), w);
-    if (!words.empty())
-      BOOST_TEST(r.unexplained_registered < r.unexplained / 2 + (r.scale != 1 || r.offset != 0));
+    // A factor and an offset leave the share that is explained as it is; all else must halve the rest.
+    const bool moved = std::any_of(words.begin(), words.end(), [](const std::string& w) {
+      return w.find("densities") == std::string::npos && w.find("offset") == std::string::npos;
+    });
+    if (moved) BOOST_TEST(r.unexplained_registered < r.unexplained / 2);
   }
 }
 
@@ -125,7 +128,8 @@ BOOST_AUTO_TEST_CASE(another_centre_and_another_window_are_named) {
     field.center = c.scan.geometry.center + 0.5;
     check_names(c, made(c.scan, field), {"F with its axis at"});
     const Registration r = found(c.scan, made(c.scan, field));
-    BOOST_TEST(std::abs(r.center - 0.5) < 0.02, c.name << " " << r.center);
+    // Words give two decimals: they are right where it is nearer to this than to the next ones.
+    BOOST_TEST(std::abs(r.center - 0.5) < 0.005, c.name << " " << r.center);
     field = {};
     field.filter = RampWindow::hann;
     check_names(c, made(c.scan, field), {"another window: hann fits better than ram-lak"});
@@ -160,8 +164,19 @@ BOOST_AUTO_TEST_CASE(what_is_put_right_is_what_it_was) {
   as_is.as_is = true;
   const Audit own = audit(device(), c.scan, v, as_is);
   BOOST_TEST(!own.registration.has_value());
-  // The factor is fitted: its own error is far below what F's interpolation errs.
-  BOOST_TEST(std::abs(a.registered->lower - own.as_is.lower) <= 0.01 * own.as_is.lower);
+  // Factor and offset are fitted by least squares: by Cauchy's inequality they are off by at most rms(e) over
+  // the standard deviation of W, and rms(e) more, with e what W errs at samples; rms of a part of them is at
+  // most twice that of all.
+  double mean = 0, squares = 0, largest = 0;
+  for (const float s : v.samples) mean += static_cast<double>(s) / static_cast<double>(v.samples.size());
+  for (const float s : v.samples) {
+    const double off = static_cast<double>(s) - mean;
+    squares += off * off / static_cast<double>(v.samples.size());
+    largest = std::max(largest, std::abs(off));
+  }
+  const double fitted = 2 * own.as_is.rms * (1 + largest / std::sqrt(squares));
+  BOOST_TEST(std::abs(a.registered->lower - own.as_is.lower) <= fitted);
+  BOOST_TEST(fitted < 0.1 * own.as_is.lower);
   BOOST_TEST(a.as_is.lower > a.registered->lower);
   BOOST_TEST(a.registered->samples == own.as_is.samples);
 }

@@ -219,10 +219,7 @@ BOOST_AUTO_TEST_CASE(a_total_below_the_truth_between_nodes_is_found_by_points) {
   GridOptions options;
   options.size = Index3{8, 8, 4};
   Volume samples{make_grid(scan.geometry, options), {}};
-  std::vector<Vec3> nodes;
-  const Index3 n = samples.grid.samples();
-  for (std::int64_t i = 0; i < n[0] * n[1] * n[2]; ++i)
-    nodes.push_back(samples.grid.position({i % n[0], i / n[0] % n[1], i / n[0] / n[1]}));
+  const std::vector<Vec3> nodes = vdvr::testing::places_of(samples.grid);
   const std::vector<double> F = exact.at(nodes);
   samples.samples.assign(F.begin(), F.end());
   const MixedVolume volume = as_mixed(samples);

@@ -120,20 +120,7 @@ BOOST_AUTO_TEST_CASE(sigma_is_that_of_repeated_scans) {
 
 BOOST_AUTO_TEST_CASE(sigma_of_cone_beam_is_that_of_repeated_scans) {
   const int scans = is_long() ? 200 : 60;
-  struct Orbit {
-    const char* name;
-    double arc_deg, shift, tilt_deg;
-  };
-  for (const Orbit& o : {Orbit{"full turn", 360, 0, 0}, Orbit{"short scan", 240, 0, 0},
-                         Orbit{"displaced", 360, 5, 0}, Orbit{"tilted", 360, 0, 2}}) {
-    ConeShape shape;
-    shape.views = 40;
-    shape.columns = 33;
-    shape.rows = 15;
-    shape.source_to_axis = 70;
-    shape.arc_deg = o.arc_deg;
-    shape.shift = o.shift;
-    shape.out_of_plane_deg = o.tilt_deg;
+  for (const auto& [name, shape] : cone_orbits()) {
     ProjectionSet scan = noisy_cone(shape);
     // A smooth object's line integrals, as the rays of parallel beam see it: only v follows from them.
     const ParallelGeometry& g = scan.geometry;
@@ -141,7 +128,7 @@ BOOST_AUTO_TEST_CASE(sigma_of_cone_beam_is_that_of_repeated_scans) {
       const double u = static_cast<double>(static_cast<std::int64_t>(i) % g.columns) - g.center;
       scan.data[i] = static_cast<float>(1.5 * std::exp(-u * u / 100));
     }
-    check(counted_often(scan, {}, some_places(10, -2, 2.3), scans, 20000), scans, o.name);
+    check(counted_often(scan, {}, some_places(10, -2, 2.3), scans, 20000), scans, name);
   }
 }
 

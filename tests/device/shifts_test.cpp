@@ -147,10 +147,7 @@ BOOST_AUTO_TEST_CASE(device_and_definition_agree_on_shifted_views) {
   const Grid grid = make_grid(scan, options);
   const Volume volume = reconstruct(device(), scan, grid, {FieldOptions{}, 32, Interpolation::cubic});
   const ExactField exact(scan, {});
-  std::vector<Vec3> points;
-  const Index3 n = grid.samples();
-  for (std::int64_t i = 0; i < grid.sample_count(); ++i)
-    points.push_back(grid.position({i % n[0], i / n[0] % n[1], i / n[0] / n[1]}));
+  const std::vector<Vec3> points = vdvr::testing::places_of(grid);
   const std::vector<double> F = exact.at(points);
   // Samples are at most 1/2 each, sums of the ramp half of that over pi radians; rows of common heights grow
   // by S_v's row sum, below 3.

@@ -151,10 +151,7 @@ MixedVolume volume_of(const ExactField& exact, const Grid& grid, int rate) {
   v.grid = grid;
   v.granularity = 2;
   v.rate = rate;
-  const Index3 n = grid.samples();
-  std::vector<Vec3> points;
-  for (std::int64_t i = 0; i < n[0] * n[1] * n[2]; ++i)
-    points.push_back(grid.position({i % n[0], i / n[0] % n[1], i / n[0] / n[1]}));
+  const std::vector<Vec3> points = vdvr::testing::places_of(grid);
   const std::vector<double> F = exact.at(points);
   v.base.f32.assign(F.begin(), F.end());
   v.level.assign(at(v.brick_count()), LevelTriple{0, 0, 0});

@@ -215,20 +215,7 @@ BOOST_AUTO_TEST_CASE(mean_of_longer_rows_is_that_of_f) {
 }
 
 BOOST_AUTO_TEST_CASE(mean_of_cone_beam_is_that_of_f) {
-  struct Orbit {
-    const char* name;
-    double arc_deg, shift, tilt_deg;
-  };
-  for (const Orbit& o : {Orbit{"full turn", 360, 0, 0}, Orbit{"short scan", 240, 0, 0},
-                         Orbit{"displaced", 360, 5, 0}, Orbit{"tilted", 360, 0, 2}}) {
-    ConeShape shape;
-    shape.views = 40;
-    shape.columns = 33;
-    shape.rows = 15;
-    shape.source_to_axis = 70;
-    shape.arc_deg = o.arc_deg;
-    shape.shift = o.shift;
-    shape.out_of_plane_deg = o.tilt_deg;
+  for (const auto& [name, shape] : cone_orbits()) {
     ProjectionSet scan = noisy_cone(shape);
     const ParallelGeometry& g = scan.geometry;
     for (std::size_t i = 0; i < scan.data.size(); ++i) {
@@ -236,8 +223,8 @@ BOOST_AUTO_TEST_CASE(mean_of_cone_beam_is_that_of_f) {
       scan.data[i] += static_cast<float>(1.5 * std::exp(-u * u / 100));
     }
     // Both ways across the detector.
-    hold_to_definition(scan, {}, cylinder_shape(o.name, 2, -1, -2, 1.5, 5), 3.5, lost(10, shape.views));
-    hold_to_definition(scan, {}, ball_shape(o.name, {-3, 2, 0.2}, 3), 6, lost(6, shape.views));
+    hold_to_definition(scan, {}, cylinder_shape(name, 2, -1, -2, 1.5, 5), 3.5, lost(10, shape.views));
+    hold_to_definition(scan, {}, ball_shape(name, {-3, 2, 0.2}, 3), 6, lost(6, shape.views));
   }
 }
 

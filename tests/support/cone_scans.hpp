@@ -17,6 +17,17 @@ struct ConeShape {
   double arc_deg = 360, shift = 0, in_plane_deg = 0, out_of_plane_deg = 0;
 };
 
+/// Orbits of all kinds, by name, of detectors of 33 x 15 pixels and 40 views.
+inline std::vector<std::pair<const char*, ConeShape>> cone_orbits() {
+  const ConeShape s{.views = 40, .rows = 15, .columns = 33, .source_to_axis = 70};
+  std::vector<std::pair<const char*, ConeShape>> out{
+      {"full turn", s}, {"short scan", s}, {"displaced", s}, {"tilted", s}};
+  out[1].second.arc_deg = 240;
+  out[2].second.shift = 5;
+  out[3].second.out_of_plane_deg = 2;
+  return out;
+}
+
 inline CircularView cone_view_of(const ConeShape& s, std::int64_t k) {
   constexpr double degree = std::numbers::pi / 180;
   CircularView view;

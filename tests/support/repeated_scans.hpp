@@ -70,10 +70,7 @@ inline Agreement repeated(const std::function<ProjectionSet(unsigned)>& scan_of,
                           const LineIntegralNoise& noise, const FieldOptions& field, const Grid& grid,
                           int scans) {
   const Volume predicted = noise_of_field(support::device(), scan_of(77), field, noise, grid);
-  std::vector<Vec3> points;
-  const Index3 n = grid.samples();
-  for (std::int64_t i = 0; i < grid.sample_count(); ++i)
-    points.push_back(grid.position({i % n[0], i / n[0] % n[1], i / n[0] / n[1]}));
+  const std::vector<Vec3> points = places_of(grid);
   std::vector<double> sum(points.size()), squares(points.size());
   for (int s = 0; s < scans; ++s) {
     const ExactField exact(scan_of(static_cast<unsigned>(1000 + s)), field);

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <optional>
 #include <random>
+#include <vector>
 
 #include "vdvr/expert/projections.hpp"
 #include "vdvr/expert/reconstruct.hpp"
@@ -58,6 +59,15 @@ inline Grid grid_of(const ProjectionSet& scan, const Index3& size, double spacin
   options.spacing = spacing;
   options.origin = origin;
   return make_grid(scan.geometry, options);
+}
+
+/// Where the samples of a grid lie, x fastest.
+inline std::vector<Vec3> places_of(const Grid& grid) {
+  const Index3 n = grid.samples();
+  std::vector<Vec3> places;
+  for (std::int64_t i = 0; i < grid.sample_count(); ++i)
+    places.push_back(grid.position({i % n[0], i / n[0] % n[1], i / n[0] / n[1]}));
+  return places;
 }
 
 }  // namespace vdvr::testing
