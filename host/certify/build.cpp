@@ -171,7 +171,7 @@ void classify(const Inputs& in, ClassifyBricks& test, const OpenBricks& bricks, 
   for (std::size_t i = 0; i < near.size(); ++i) near[i] = near[i] && in.selected[i];
   keep_share(in, share, near);
   const MixedVolume level0 = as_mixed(bricks.base, in.gold.fine.gold().settings());
-  const DeviceField base(in.state, level0);
+  const DeviceField base(in.state, level0, in.budget.for_bytes(sample_buffer_bytes(level0)));
   if (in.crew) in.crew->use(level0, in.budget);
   test.classify(base, tolerance, near);
   in.watch.lap("classify");

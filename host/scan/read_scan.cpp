@@ -126,9 +126,10 @@ void read_samples(const io::RawScan& raw, const ScanOptions& options, const View
   }
   const double full = raw.counts && !raw.flat_level ? io::saturation_of(raw, field.largest_flat) : 0;
   const auto samples = static_cast<std::size_t>(raw.projections.count * size);
-  scan.data =
-      SampleArray(samples, scratch_for(samples * sizeof(float), options.max_memory_bytes, options.scratch),
-                  "the projections");
+  scan.data = SampleArray(samples,
+                          scratch_for_scan(raw.projections.count, raw.rows, raw.columns,
+                                           options.max_memory_bytes, options.scratch),
+                          "the projections");
   std::vector<double> block(static_cast<std::size_t>(step * size));
   std::vector<std::int64_t> dead(static_cast<std::size_t>(step)), blank;
   std::vector<io::ValueTotals> of_view(static_cast<std::size_t>(step));

@@ -121,3 +121,16 @@ BOOST_AUTO_TEST_CASE(half_of_the_free_memory_is_some_of_it) {
   in >> name >> kibi;  // MemTotal
   BOOST_TEST(half_of_free_memory() <= kibi * 512);
 }
+
+// A wide detector of few rows: a small scan, a large volume.
+BOOST_AUTO_TEST_CASE(scan_lies_in_scratch_where_its_volume_takes_more_than_a_sixteenth) {
+  constexpr std::int64_t rows = 40, columns = 384;
+  constexpr std::uint64_t volume = 4 * columns * columns * rows;
+  BOOST_TEST(!scratch_for_scan(60, rows, columns, 0, {}));
+  BOOST_TEST(!scratch_for_scan(60, rows, columns, 16 * volume, {}));
+  BOOST_TEST(static_cast<bool>(scratch_for_scan(60, rows, columns, 16 * volume - 16, {})));
+  // Of many views it is the scan that counts, by an eighth.
+  constexpr std::uint64_t scan = 3 * volume;
+  BOOST_TEST(!scratch_for_scan(3 * columns, rows, columns, 8 * scan, {}));
+  BOOST_TEST(static_cast<bool>(scratch_for_scan(3 * columns, rows, columns, 8 * scan - 8, {})));
+}

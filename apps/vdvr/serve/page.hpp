@@ -5,7 +5,8 @@
 
 namespace vdvr::cli {
 
-/// The text of "page.html", "page.js" or "page.css"; empty for any other name.
+/// The text of "page.html", "page.css", "page.js" or "curve.js"; empty for any other name. Scripts are sent
+/// as one.
 std::string_view page_file(std::string_view name);
 
 }  // namespace vdvr::cli

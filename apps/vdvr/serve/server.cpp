@@ -155,11 +155,12 @@ struct Server::Impl {
   }
 
   [[nodiscard]] Answer file(Resource asked) const {
-    const std::string_view text = asked == Resource::scene    ? std::string_view(options.scene)
-                                  : asked == Resource::script ? page_file("page.js")
-                                  : asked == Resource::style  ? page_file("page.css")
-                                                              : page_file("page.html");
-    return {200, media_type(asked), std::string(text)};
+    std::string text(asked == Resource::scene    ? std::string_view(options.scene)
+                     : asked == Resource::script ? page_file("page.js")
+                     : asked == Resource::style  ? page_file("page.css")
+                                                 : page_file("page.html"));
+    if (asked == Resource::script) text += page_file("curve.js");
+    return {200, media_type(asked), std::move(text)};
   }
 
   /// A line of JSON, then the picture.

@@ -205,6 +205,12 @@ std::shared_ptr<Scratch> scratch_for(std::uint64_t bytes, std::uint64_t max_memo
   return std::make_shared<Scratch>(folder.empty() ? default_scratch_folder() : folder, share);
 }
 
+std::shared_ptr<Scratch> scratch_for_scan(std::int64_t views, std::int64_t rows, std::int64_t columns,
+                                          std::uint64_t max_memory_bytes, const fs::path& folder) {
+  const auto samples = static_cast<std::uint64_t>(std::max(views, 2 * columns) * rows * columns);
+  return scratch_for(samples * sizeof(float), max_memory_bytes, folder);
+}
+
 namespace {
 
 std::optional<std::uint64_t> number_in(const fs::path& file) {

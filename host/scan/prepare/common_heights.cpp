@@ -60,7 +60,7 @@ void common_heights(ProjectionSet& scan, const Preparation& wanted, std::uint64_
         range, g.rows, g.rows - 1));
   const std::int64_t rows = g.rows, columns = g.columns;
   const auto size = static_cast<std::uint64_t>(g.views() * common * columns);
-  auto room = scratch_for(size * sizeof(float), max_memory_bytes, scratch);
+  auto room = scratch_for_scan(g.views(), common, columns, max_memory_bytes, scratch);
   io::require_memory(scan.data.resident_bytes() + (room ? max_memory_bytes / 8 : size * sizeof(float)),
                      max_memory_bytes, fmt::format("{} rows at common heights", common));
   SampleArray out(size, std::move(room), "the projections at common heights");

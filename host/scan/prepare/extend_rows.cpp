@@ -153,7 +153,7 @@ void make_longer(ProjectionSet& scan, const RowExtension& e, std::uint64_t max_m
   const std::vector<float> factors = factors_of(g, e.half_acquisition.value_or(false)),
                            taper = taper_of(e.padding == Padding::none ? 0 : (columns + 1) / 2);
   const std::uint64_t bytes = static_cast<std::uint64_t>(lines * wide) * sizeof(float);
-  auto room = scratch_for(bytes, max_memory_bytes, scratch);
+  auto room = scratch_for_scan(g.views(), g.rows, wide, max_memory_bytes, scratch);
   io::require_memory(scan.data.resident_bytes() + (room ? max_memory_bytes / 8 : bytes), max_memory_bytes,
                      fmt::format("rows of {} columns, made longer from {}", wide, columns));
   SampleArray longer(at(lines * wide), std::move(room), "the projections with longer rows");

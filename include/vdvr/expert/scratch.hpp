@@ -65,6 +65,12 @@ VDVR_API std::filesystem::path default_scratch_folder();
 /// default), of which an eighth of the limit may be resident.
 VDVR_API std::shared_ptr<Scratch> scratch_for(std::uint64_t bytes, std::uint64_t max_memory_bytes,
                                               const std::filesystem::path& folder);
+/// The same for a scan, and where the volume at its pitch, columns x columns x rows, takes a sixteenth: a
+/// build holds four of these as base samples, four as gold that is kept and eight as heights made of that,
+/// and kept gold lies where the scan does. A wide detector of few rows has a small scan and a large volume.
+VDVR_API std::shared_ptr<Scratch> scratch_for_scan(std::int64_t views, std::int64_t rows,
+                                                   std::int64_t columns, std::uint64_t max_memory_bytes,
+                                                   const std::filesystem::path& folder);
 
 /// Half of the memory that is free now, as the system and the process's control group say: the default of
 /// --max-memory. 0 where neither says.
