@@ -11,6 +11,7 @@ import sys
 _NAME = "libOpenCL.so.1"
 # What Intel's loader needs, and does not say where it is; each after what it needs itself.
 _BEFORE = ("libintlc.so.5", "libirng.so", "libimf.so", "libsvml.so")
+_DEVICE = 3  # the exit code of the program where a device is missing
 _REMEDY = (
     f"{_NAME} was not found: install Debian's ocl-icd-libopencl1 with a driver of your GPU, or for the processor "
     "`pip install 'vdvr[cpu]'`"
@@ -24,6 +25,9 @@ def _load() -> None:
     except OSError:
         folder = os.path.join(sys.prefix, "lib")
     if not os.path.exists(os.path.join(folder, _NAME)):
+        if os.path.basename(sys.argv[0]) == "vdvr":  # the command: what the user needs is the line, not a traceback
+            print(f"vdvr: {_REMEDY}", file=sys.stderr)
+            raise SystemExit(_DEVICE)
         raise ImportError(_REMEDY)
     for name in (*_BEFORE, _NAME):
         path = os.path.join(folder, name)

@@ -49,6 +49,13 @@ assert vdvr.verify(volume, scan)
 assert volume.render((64, 48)).std() > 5
 assert "jupyter_rfb" not in sys.modules and "vtk" not in sys.modules
 if WITHOUT in os.environ:
+    # Without the extra, too (an empty prefix): one line with the remedy, from the command and from the import.
+    bare = ["import sys; sys.prefix = '/nowhere'; sys.argv = ['/venv/bin/vdvr', '--version']; import vdvr",
+            "import sys; sys.prefix = '/nowhere'; import vdvr"]
+    ended = [subprocess.run([sys.executable, "-c", code], capture_output=True, text=True) for code in bare]
+    assert ended[0].returncode == 3 and ended[0].stderr.startswith("vdvr: libOpenCL.so.1 was not found"), ended[0]
+    assert ended[0].stderr.count("\n") == 1 and "vdvr[cpu]" in ended[0].stderr, ended[0]
+    assert ended[1].returncode == 1 and "ImportError: libOpenCL.so.1 was not found" in ended[1].stderr, ended[1]
     command = str(pathlib.Path(sys.executable).with_name("vdvr"))
     subprocess.run([command, "simulate", "--phantom", "sphere", "--detector", "33x9", "--angles", "40", "-o", "s.h5"], check=True)
     subprocess.run([command, "run", "s.h5", "--epsilon", "4%", "-o", "result"], check=True, stdout=subprocess.DEVNULL)

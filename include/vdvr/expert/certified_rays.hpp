@@ -28,7 +28,7 @@ struct SurfaceBounds {
   /// and it is sure where F is surely on both sides of the value further on.
   FloatImage first, last;
 
-  [[nodiscard]] double share(std::uint8_t kind) const;
+  [[nodiscard]] VDVR_API double share(std::uint8_t kind) const;
 };
 
 /// The largest F along rays, and where it lies: [y][x], NaN where a ray misses the covered region. `high` is
