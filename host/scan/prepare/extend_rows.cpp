@@ -72,6 +72,7 @@ void require_half_acquisition(const ParallelGeometry& own) {
 RowExtension extension_of(const ParallelGeometry& own, bool half, Padding padding) {
   RowExtension e;
   e.common_heights = own.extension.common_heights;
+  e.cut = own.extension.cut;
   e.padding = padding;
   e.center = own.center;
   const Sides sides(own);
@@ -235,6 +236,7 @@ ParallelGeometry own_detector(const ParallelGeometry& g) {
   }
   own.extension = {};
   own.extension.common_heights = e.common_heights;
+  own.extension.cut = e.cut;
   return own;
 }
 
