@@ -18,10 +18,10 @@ namespace vdvr {
 namespace {
 
 constexpr std::int64_t most_bands = 16, fewest_bands = 3;
-constexpr std::int64_t most_rows = 256;                      // that are read of a view
-constexpr double least_quality = 0.5, most_uncertainty = 1;  // as find_center() has it; columns
+constexpr std::int64_t most_rows = 256;                     // that are read of a view
+constexpr double band_quality = 0.5, band_uncertainty = 1;  // as find_center() has it; columns
 // What registration of two rows gets wrong, by interpolation between columns.
-constexpr double least_uncertainty = 0.01;
+constexpr double finest_uncertainty = 0.01;
 
 // The rows that are read, and the bands they are in.
 struct Rows {
@@ -107,7 +107,7 @@ std::vector<BandCenter> centers_of(const ProjectionSet& bands, const Rows& rows)
   const std::int64_t n = bands.geometry.rows;
   for (std::int64_t b = 0; b < n; ++b) {
     const auto witness = center_of_band(band_of(bands, b));
-    if (!witness || !(witness->quality >= least_quality) || !(witness->uncertainty <= most_uncertainty))
+    if (!witness || !(witness->quality >= band_quality) || !(witness->uncertainty <= band_uncertainty))
       continue;
     found.push_back({rows.row[at(b)], *witness});
   }
@@ -132,7 +132,7 @@ std::optional<Line> line_through(const std::vector<BandCenter>& centers) {
   if (std::ssize(centers) < fewest_bands) return {};
   double w = 0, wx = 0, wy = 0, wxx = 0, wxy = 0;
   const auto weight = [](const BandCenter& b) {
-    return 1 / std::pow(std::max(b.witness.uncertainty, least_uncertainty), 2);
+    return 1 / std::pow(std::max(b.witness.uncertainty, finest_uncertainty), 2);
   };
   for (const BandCenter& b : centers) {
     const double u = weight(b);
