@@ -329,7 +329,7 @@ void add_projections(nb::module_& m) {
       .def_ro("roll_deg", &RollEstimate::roll_deg, "Degrees; towards higher columns at higher rows.")
       .def_ro("uncertainty_deg", &RollEstimate::uncertainty_deg, "One standard deviation.")
       .def_ro("significant", &RollEstimate::significant, "Whether it is off what the scan was read with.")
-      .def_ro("bands", &RollEstimate::bands, "Bands of rows that knew their centres.")
+      .def_ro("pairs", &RollEstimate::pairs, "Of views from either side.")
       .def_ro("method", &RollEstimate::method);
   m.def(
       "find_roll",

@@ -96,7 +96,7 @@ void print_found(const std::optional<CenterEstimate>& found, const DetectorColum
     fmt::print("centre         not found: no method applies to these views, or none explains them\n");
     return;
   }
-  fmt::print("centre         {:.2f} +- {:.2g}, {}\n", unbinned_center(found->center, binning),
+  fmt::print("centre         {:.2f} +- {:.2g}, {}\n", columns(found->center),
              std::max(0.01, found->uncertainty * binning), found->sure ? "sure" : "UNSURE: " + found->doubt);
   fmt::print("  method       {}, which explains {:.1f} %\n", found->method, 100 * found->quality);
   for (const CenterWitness& w : found->others)

@@ -1,187 +1,287 @@
-// The line through the centres of bands of rows.
+// Gauss-Newton for the axis' place and roll, from coarse pictures to fine ones.
+//
+// A view and the one from behind are mirror images about the axis: with T across the axis from the detector's
+// middle, z along it, and the axis at T = a,
+//
+//   r(t, z) = A(a + t, z) - B(a - t, z) = 0,   A(T, z) = view at u = T c + z s, v = -T s + z c.
+//
+// d/da moves both along T, d/droll moves a point of either picture by (v, -u).
 #include "vdvr/expert/find_roll.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 #include <vector>
 
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
-#include "host/scan/center/half_turn.hpp"
-#include "host/scan/center/opposite_views.hpp"
+#include "host/scan/center/row_bands.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/find_center.hpp"
 
 namespace vdvr {
 namespace {
 
-constexpr std::int64_t most_bands = 16, fewest_bands = 3;
-constexpr std::int64_t most_rows = 256;                     // that are read of a view
-constexpr double band_quality = 0.5, band_uncertainty = 1;  // as find_center() has it; columns
-// What registration of two rows gets wrong, by interpolation between columns.
-constexpr double finest_uncertainty = 0.01;
+constexpr std::int64_t most_opposite_pairs = 32, blocks = 16, fewest_rows_of_roll = 4;
+// Of a column of the finest pictures: how well edges that no pixel resolves can be registered.
+constexpr double registered = 0.05;
+constexpr std::int64_t finest_columns = 256, coarsest_columns = 64;
 
-// The rows that are read, and the bands they are in.
-struct Rows {
-  explicit Rows(std::int64_t all) : bands(std::min(most_bands, all)), row(at(bands)), count(at(bands)) {
-    const std::int64_t by = (all + most_rows - 1) / most_rows;
-    for (std::int64_t j = by / 2; j < all; j += by) {
-      const auto band = at(j * bands / all);
-      row[band] += static_cast<double>(j) - 0.5 * static_cast<double>(all - 1);
-      count[band] += 1;
-      read.push_back({j, j * bands / all});
-    }
-    for (std::size_t b = 0; b < row.size(); ++b) row[b] /= std::max(1.0, count[b]);
-  }
-  std::int64_t bands;
-  std::vector<double> row, count;  // mean row of each band, from the middle one
-  std::vector<std::pair<std::int64_t, std::int64_t>> read;
+// double data[row][column], lengths in columns of the detector from its middle.
+struct Picture {
+  std::int64_t columns = 0, rows = 0;
+  double step_u = 1, step_v = 1;
+  std::vector<double> data;
 };
 
-// Means of bands of rows that stand upright on an axis of this roll, read between pixels: float
-// [view][band][column].
-ProjectionSet upright_bands(const ProjectionSet& scan, const Rows& rows, double roll_rad) {
+// A sum of views, times these.
+using ViewSum = std::vector<std::pair<std::int64_t, double>>;
+
+// Means of `factor` columns and rows; what is left over is cut on both sides alike.
+Picture picture_of(const ProjectionSet& scan, const ViewSum& sum, std::int64_t factor) {
   const ParallelGeometry& g = scan.geometry;
-  const std::int64_t U = g.columns, V = g.rows, bands = rows.bands;
-  ProjectionSet out;
-  out.geometry = g;
-  out.geometry.rows = bands;
-  out.data = SampleArray(std::vector<float>(at(out.size())));
-  const double c = std::cos(roll_rad), s = std::sin(roll_rad), aspect = g.pitch_v / g.pitch_u,
-               middle_u = 0.5 * static_cast<double>(U - 1), middle_v = 0.5 * static_cast<double>(V - 1);
-  parallel_for(g.views(), {}, "", [&](std::int64_t k) {
-    const float* view = scan.data.data() + k * V * U;
-    const double moved = g.column_shift.empty() ? 0 : g.column_shift[at(k)];
-    std::vector<double> sum(at(bands * U));
-    for (const auto& [j, band] : rows.read) {
-      const double z = (static_cast<double>(j) - middle_v) * aspect;
-      for (std::int64_t i = 0; i < U; ++i) {
-        const double t = static_cast<double>(i) - middle_u + moved;
-        const double u = std::clamp(t * c + z * s + middle_u, 0.0, static_cast<double>(U - 1)),
-                     v = std::clamp((z * c - t * s) / aspect + middle_v, 0.0, static_cast<double>(V - 1));
-        const auto u0 = std::min(static_cast<std::int64_t>(u), std::max<std::int64_t>(0, U - 2)),
-                   v0 = std::min(static_cast<std::int64_t>(v), std::max<std::int64_t>(0, V - 2));
-        const double fu = u - static_cast<double>(u0), fv = v - static_cast<double>(v0);
-        const auto on_row = [&](std::int64_t row) {
-          const float* p = view + row * U + u0;
-          return std::lerp(static_cast<double>(p[0]), static_cast<double>(p[U > 1 ? 1 : 0]), fu);
-        };
-        sum[at(band * U + i)] += std::lerp(on_row(v0), on_row(V > 1 ? v0 + 1 : v0), fv);
-      }
+  const std::int64_t of_rows = std::min(factor, std::max<std::int64_t>(1, g.rows / fewest_rows_of_roll));
+  Picture out{g.columns / factor,
+              g.rows / of_rows,
+              static_cast<double>(factor),
+              static_cast<double>(of_rows) * g.pitch_v / g.pitch_u,
+              {}};
+  out.data.assign(at(out.columns * out.rows), 0.0);
+  const std::int64_t first_u = (g.columns - out.columns * factor) / 2,
+                     first_v = (g.rows - out.rows * of_rows) / 2;
+  for (const auto& [view, times] : sum) {
+    const double share = times / static_cast<double>(factor * of_rows);
+    for (std::int64_t j = 0; j < out.rows * of_rows; ++j) {
+      const float* row = scan.data.data() + (view * g.rows + first_v + j) * g.columns + first_u;
+      double* to = out.data.data() + j / of_rows * out.columns;
+      for (std::int64_t i = 0; i < out.columns * factor; ++i)
+        to[i / factor] += share * static_cast<double>(row[i]);
     }
-    for (std::int64_t b = 0; b < bands; ++b)
-      for (std::int64_t i = 0; i < U; ++i)
-        out.data[at((k * bands + b) * U + i)] = static_cast<float>(sum[at(b * U + i)] / rows.count[at(b)]);
-  });
-  out.geometry.column_shift.clear();
+  }
   return out;
 }
 
-ProjectionSet band_of(const ProjectionSet& bands, std::int64_t band) {
-  const ParallelGeometry& g = bands.geometry;
-  ProjectionSet one;
-  one.geometry = g;
-  one.geometry.rows = 1;
-  one.data = SampleArray(std::vector<float>(at(one.size())));
-  for (std::int64_t k = 0; k < g.views(); ++k)
-    std::copy_n(bands.data.data() + (k * g.rows + band) * g.columns, g.columns,
-                one.data.data() + k * g.columns);
-  return one;
-}
-
-// By opposite views, or by the ends of half a turn.
-std::optional<CenterWitness> center_of_band(const ProjectionSet& band) {
-  if (const auto opposite = center::from_opposite_views(band)) return opposite->all;
-  return center::from_ends(band);
-}
-
-struct BandCenter {
-  double row = 0;  // from the middle one
-  CenterWitness witness;
+// Value and slopes in columns at a place, bicubic (Catmull-Rom); false near the edge.
+struct Reading {
+  double value = 0, along_u = 0, along_v = 0;
 };
-
-std::vector<BandCenter> centers_of(const ProjectionSet& bands, const Rows& rows) {
-  std::vector<BandCenter> found;
-  const std::int64_t n = bands.geometry.rows;
-  for (std::int64_t b = 0; b < n; ++b) {
-    const auto witness = center_of_band(band_of(bands, b));
-    if (!witness || !(witness->quality >= band_quality) || !(witness->uncertainty <= band_uncertainty))
-      continue;
-    found.push_back({rows.row[at(b)], *witness});
-  }
-  // One that took another object for the mirror image of this one.
-  std::vector<double> sorted;
-  for (const BandCenter& b : found) sorted.push_back(b.witness.center);
-  std::sort(sorted.begin(), sorted.end());
-  if (sorted.empty()) return found;
-  const double median = sorted[sorted.size() / 2], reach = std::tan(most_axis_roll_deg * radians_per_degree) *
-                                                           2 * std::abs(rows.row.front()) *
-                                                           bands.geometry.pitch_v / bands.geometry.pitch_u;
-  std::erase_if(found, [&](const BandCenter& b) { return std::abs(b.witness.center - median) > reach + 2; });
-  return found;
-}
-
-// center = at + slope row, by weighted least squares; what bands leave unexplained makes it less sure.
-struct Line {
-  double at = 0, slope = 0, uncertainty = 0;
-};
-
-std::optional<Line> line_through(const std::vector<BandCenter>& centers) {
-  if (std::ssize(centers) < fewest_bands) return {};
-  double w = 0, wx = 0, wy = 0, wxx = 0, wxy = 0;
-  const auto weight = [](const BandCenter& b) {
-    return 1 / std::pow(std::max(b.witness.uncertainty, finest_uncertainty), 2);
+bool read(const Picture& p, double u, double v, Reading& out) {
+  const double x = u / p.step_u + 0.5 * static_cast<double>(p.columns - 1),
+               y = v / p.step_v + 0.5 * static_cast<double>(p.rows - 1);
+  const auto i = static_cast<std::int64_t>(std::floor(x)), j = static_cast<std::int64_t>(std::floor(y));
+  if (i < 1 || j < 1 || i + 2 >= p.columns || j + 2 >= p.rows) return false;
+  const auto weights = [](double f) {
+    return std::array{std::array{((2 - f) * f - 1) * f / 2, ((3 * f - 5) * f * f + 2) / 2,
+                                 ((4 - 3 * f) * f + 1) * f / 2, (f - 1) * f * f / 2},
+                      std::array{((4 - 3 * f) * f - 1) / 2, (9 * f - 10) * f / 2, ((8 - 9 * f) * f + 1) / 2,
+                                 (3 * f - 2) * f / 2}};
   };
-  for (const BandCenter& b : centers) {
-    const double u = weight(b);
-    w += u, wx += u * b.row, wy += u * b.witness.center, wxx += u * b.row * b.row,
-        wxy += u * b.row * b.witness.center;
+  const auto wx = weights(x - static_cast<double>(i)), wy = weights(y - static_cast<double>(j));
+  out = {};
+  for (std::size_t b = 0; b < 4; ++b) {
+    const double* row = p.data.data() + (j - 1 + static_cast<std::int64_t>(b)) * p.columns + i - 1;
+    double value = 0, slope = 0;
+    for (std::size_t a = 0; a < 4; ++a) value += wx[0][a] * row[a], slope += wx[1][a] * row[a];
+    out.value += wy[0][b] * value;
+    out.along_u += wy[0][b] * slope / p.step_u;
+    out.along_v += wy[1][b] * value / p.step_v;
   }
-  const double spread = wxx - wx * wx / w;
-  if (!(spread > 0)) return {};
-  Line line;
-  line.slope = (wxy - wx * wy / w) / spread;
-  line.at = (wy - line.slope * wx) / w;
-  double chi = 0;
-  for (const BandCenter& b : centers)
-    chi += weight(b) * std::pow(b.witness.center - line.at - line.slope * b.row, 2);
-  line.uncertainty = std::sqrt(std::max(1.0, chi / static_cast<double>(std::ssize(centers) - 2)) / spread);
-  return line;
+  return true;
+}
+
+// Sums of Gauss and Newton's normal equations: unknowns are the axis' place and the roll.
+struct Normal {
+  double aa = 0, ar = 0, rr = 0, a = 0, r = 0, square = 0;
+  std::int64_t samples = 0;
+  void add(const Normal& o, double times = 1) {
+    aa += times * o.aa, ar += times * o.ar, rr += times * o.rr, a += times * o.a, r += times * o.r;
+    square += times * o.square;
+    samples += static_cast<std::int64_t>(times) * o.samples;
+  }
+  [[nodiscard]] std::array<double, 2> step() const {
+    const double det = aa * rr - ar * ar;
+    if (!(det > 1e-9 * aa * rr)) return {0, 0};
+    return {-(a * rr - r * ar) / det, -(r * aa - a * ar) / det};
+  }
+};
+
+struct Axis {
+  double place = 0, roll = 0;  // columns from the detector's middle; radians
+};
+
+// By block of heights, so that what they say apart tells how sure all of them are.
+std::vector<Normal> equations(const Picture& one, const Picture& other, const Axis& axis) {
+  std::vector<Normal> out(at(blocks));
+  const double c = std::cos(axis.roll), s = std::sin(axis.roll);
+  const auto places = [&](double T, double z) { return std::array{T * c + z * s, z * c - T * s}; };
+  for (std::int64_t j = 0; j < one.rows; ++j) {
+    const double z = (static_cast<double>(j) - 0.5 * static_cast<double>(one.rows - 1)) * one.step_v;
+    Normal& n = out[at(j * blocks / one.rows)];
+    for (std::int64_t i = 0; i < one.columns; ++i) {
+      const double T = (static_cast<double>(i) - 0.5 * static_cast<double>(one.columns - 1)) * one.step_u;
+      const auto [u, v] = places(T, z);
+      const auto [mu, mv] = places(2 * axis.place - T, z);
+      Reading A, B;
+      if (!read(one, u, v, A) || !read(other, mu, mv, B)) continue;
+      const double r = A.value - B.value;
+      // T = place + t and place - t move with the place; t is held.
+      const double by_place = (A.along_u * c - A.along_v * s) - (B.along_u * c - B.along_v * s),
+                   by_roll = (A.along_u * v - A.along_v * u) - (B.along_u * mv - B.along_v * mu);
+      n.aa += by_place * by_place, n.ar += by_place * by_roll, n.rr += by_roll * by_roll;
+      n.a += by_place * r, n.r += by_roll * r, n.square += r * r;
+      ++n.samples;
+    }
+  }
+  return out;
+}
+
+using PicturePairs = std::vector<std::pair<Picture, Picture>>;
+
+std::vector<Normal> equations(const PicturePairs& pairs, const Axis& axis) {
+  std::vector<std::vector<Normal>> of_pair(pairs.size());
+  parallel_for(std::ssize(pairs), {}, "", [&](std::int64_t k) {
+    of_pair[at(k)] = equations(pairs[at(k)].first, pairs[at(k)].second, axis);
+  });
+  std::vector<Normal> sum(at(blocks));
+  for (const auto& one : of_pair)
+    for (std::size_t b = 0; b < sum.size(); ++b) sum[b].add(one[b]);
+  return sum;
+}
+
+Normal total(const std::vector<Normal>& of_block) {
+  Normal sum;
+  for (const Normal& n : of_block) sum.add(n);
+  return sum;
+}
+
+// Opposite views to within a quarter of a step; of half a turn without its end what lies beyond either end,
+// by the line through the two views before it.
+std::vector<std::pair<ViewSum, ViewSum>> view_pairs(const std::vector<double>& theta) {
+  using center::pi;
+  const double step = center::median_step(theta);
+  std::vector<std::pair<ViewSum, ViewSum>> pairs;
+  if (!(step > 0) || step > pi / 12) return pairs;
+  const auto off = [&](std::size_t i, std::size_t j, double apart) {
+    return std::abs(std::remainder(theta[j] - theta[i] - apart, 2 * pi));
+  };
+  const double near = 1e-3 * step;
+  for (std::size_t i = 0; i < theta.size(); ++i)
+    for (std::size_t j = i + 1; j < theta.size(); ++j)
+      if (off(i, j, pi) <= near)
+        pairs.push_back({{{static_cast<std::int64_t>(i), 1.0}}, {{static_cast<std::int64_t>(j), 1.0}}});
+  if (std::ssize(pairs) > most_opposite_pairs) {
+    std::vector<std::pair<ViewSum, ViewSum>> spread;
+    for (std::int64_t k = 0; k < most_opposite_pairs; ++k)
+      spread.push_back(pairs[at(k * std::ssize(pairs) / most_opposite_pairs)]);
+    return spread;
+  }
+  if (!pairs.empty() || theta.size() < 8) return pairs;
+  const auto order = center::by_angle(theta);
+  const auto first = order[0], second = order[1], last = order[order.size() - 1],
+             before = order[order.size() - 2];
+  if (off(at(first), at(last), pi - step) > 0.05 * step || off(at(first), at(second), step) > 0.05 * step ||
+      off(at(before), at(last), step) > 0.05 * step)
+    return pairs;
+  pairs.push_back({{{first, 1.0}}, {{last, 2.0}, {before, -1.0}}});
+  pairs.push_back({{{first, 2.0}, {second, -1.0}}, {{last, 1.0}}});
+  return pairs;
+}
+
+// Enough of them to search by.
+PicturePairs some_of(const PicturePairs& pairs) {
+  constexpr std::int64_t enough = 8;
+  PicturePairs some;
+  for (std::int64_t k = 0; k < std::min(enough, std::ssize(pairs)); ++k)
+    some.push_back(pairs[at(k * std::ssize(pairs) / std::min(enough, std::ssize(pairs)))]);
+  return some;
+}
+
+// The roll under which pictures a few dozen columns wide differ least: what the finer ones begin with.
+Axis searched(const PicturePairs& pairs, double place) {
+  Axis best{place, 0};
+  double least = INFINITY;
+  for (double degrees = -1.2 * most_axis_roll_deg; degrees <= 1.2 * most_axis_roll_deg; degrees += 0.5) {
+    Axis axis{place, degrees * radians_per_degree};
+    Normal n = total(equations(pairs, axis));
+    // The place follows the roll: of an object that is not in the middle row.
+    for (int i = 0; i < 2 && n.aa > 0; ++i) {
+      axis.place -= n.a / n.aa;
+      n = total(equations(pairs, axis));
+    }
+    const double rest = n.samples > 0 ? n.square / static_cast<double>(n.samples) : INFINITY;
+    if (rest < least) least = rest, best = axis;
+  }
+  return best;
+}
+
+// By the jackknife over blocks of heights.
+double uncertainty_of(const std::vector<Normal>& of_block) {
+  const Normal all = total(of_block);
+  std::vector<double> without;
+  for (const Normal& one : of_block) {
+    if (one.samples == 0) continue;
+    Normal rest = all;
+    rest.add(one, -1);
+    without.push_back(rest.step()[1]);
+  }
+  const auto n = static_cast<double>(without.size());
+  double mean = 0, square = 0;
+  for (const double roll : without) mean += roll / n;
+  for (const double roll : without) square += std::pow(roll - mean, 2);
+  return n < 3 ? INFINITY : std::sqrt(square * (n - 1) / n);
 }
 
 }  // namespace
 
 std::optional<RollEstimate> find_roll(const ProjectionSet& scan) {
   const ParallelGeometry& g = scan.geometry;
-  if (scan.cone || g.rows < fewest_bands || g.views() < 2 || g.columns < 8) return std::nullopt;
+  if (scan.cone || g.rows < fewest_rows_of_roll || g.columns < 16 || !g.column_shift.empty())
+    return std::nullopt;
   if (static_cast<std::int64_t>(scan.data.size()) != scan.size())
     throw InputError(
         fmt::format("{} samples for {} views of {} x {}", scan.data.size(), g.views(), g.rows, g.columns));
-  const double aspect = g.pitch_u / g.pitch_v, most = 1.5 * most_axis_roll_deg * radians_per_degree;
-  const Rows rows(g.rows);
-  double roll = 0;
-  RollEstimate found;
-  constexpr int passes = 3;
-  for (int pass = 0; pass < passes; ++pass) {
-    const ProjectionSet bands = upright_bands(scan, rows, roll);
-    const std::vector<BandCenter> centers = centers_of(bands, rows);
-    const auto line = line_through(centers);
-    if (!line) return std::nullopt;
-    roll += std::atan(line->slope * aspect);
-    if (!(std::abs(roll) <= most)) return std::nullopt;
-    found.uncertainty_deg = std::atan(line->uncertainty * aspect) * degrees_per_radian;
-    found.center = line->at;
-    found.bands = std::ssize(centers);
-    found.method = fmt::format("the centres of {} bands of rows", found.bands);
-    if (std::abs(line->slope) < 0.1 * line->uncertainty) break;
+  const auto sums = view_pairs(g.theta_rad);
+  const auto center = sums.empty() ? std::nullopt : find_center(scan);
+  if (!center) return std::nullopt;
+  Axis axis{center->center - 0.5 * static_cast<double>(g.columns - 1), 0};
+  std::vector<Normal> last;
+  const std::int64_t finest = (g.columns + finest_columns - 1) / finest_columns;
+  std::int64_t factor = std::max(finest, g.columns / coarsest_columns);
+  for (bool first = true;; first = false, factor = std::max(finest, factor / 2)) {
+    PicturePairs pairs(sums.size());
+    parallel_for(std::ssize(sums), {}, "", [&](std::int64_t k) {
+      pairs[at(k)] = {picture_of(scan, sums[at(k)].first, factor),
+                      picture_of(scan, sums[at(k)].second, factor)};
+    });
+    if (first) axis = searched(some_of(pairs), axis.place);
+    constexpr int steps = 8;
+    for (int i = 0; i < steps; ++i) {
+      last = equations(pairs, axis);
+      const auto [place, roll] = total(last).step();
+      axis.place += place;
+      axis.roll += roll;
+      if (std::abs(roll) * static_cast<double>(g.columns) < 1e-3) break;
+    }
+    if (factor == finest) break;
   }
-  const double off = std::abs(roll) * degrees_per_radian;
-  found.significant =
-      off > 4 * found.uncertainty_deg &&
-      std::tan(std::abs(roll)) / aspect * 0.5 * static_cast<double>(g.rows - 1) > center_agreement;
-  found.roll_deg = g.axis_roll_deg + roll * degrees_per_radian;
+  const double half = 0.5 * static_cast<double>(g.columns),
+               uncertainty = std::hypot(uncertainty_of(last), registered * static_cast<double>(finest) / half);
+  if (!(std::abs(axis.roll) < 1.5 * most_axis_roll_deg * radians_per_degree) || !std::isfinite(uncertainty))
+    return std::nullopt;
+  RollEstimate found;
+  found.roll_deg = g.axis_roll_deg + axis.roll * degrees_per_radian;
+  found.uncertainty_deg = uncertainty * degrees_per_radian;
+  found.center = axis.place + 0.5 * static_cast<double>(g.columns - 1);
+  found.pairs = std::ssize(sums);
+  const double at_ends =
+      std::abs(axis.roll) * 0.5 *
+      std::max(static_cast<double>(g.rows) * g.pitch_v / g.pitch_u, static_cast<double>(g.columns));
+  found.significant = std::abs(axis.roll) > 4 * uncertainty && at_ends > center_agreement;
+  found.method = fmt::format("{} pair{} of {}", found.pairs, found.pairs == 1 ? "" : "s",
+                             sums.front().second.size() == 1 ? "opposite views" : "ends of half a turn");
   return found;
 }
 

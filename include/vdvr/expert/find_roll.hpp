@@ -13,19 +13,20 @@ namespace vdvr {
 
 struct RollEstimate {
   double roll_deg = 0;         ///< of ParallelGeometry; what is stated already is in it
-  double uncertainty_deg = 0;  ///< one standard deviation, from how far bands of rows leave the line
-  double center = 0;           ///< column of the axis in the middle row, of the rows as they are
-  std::int64_t bands = 0;      ///< bands of rows that knew their centre
-  /// Four standard deviations from what is stated, and a quarter of a column at the outermost rows.
+  double uncertainty_deg = 0;  ///< one standard deviation, by the jackknife over sixteen blocks of heights
+  double center = 0;           ///< column of the axis, across it from the middle of the rows as they are
+  std::int64_t pairs = 0;      ///< of views that look from either side
+  /// Four standard deviations from what is stated, and a quarter of a column at the detector's edges.
   bool significant = false;
   std::string method;  ///< one phrase for the user
 };
 
-/// The centres of up to 16 bands of rows lie on the axis: of opposite views, else of half a turn's ends.
-/// Bands are read once more along the line found, until it stands still, so that a roll of degrees is found
-/// as well as one of hundredths. Nothing for cone beam, for fewer than 3 rows, and where fewer than 3 bands
-/// know their centre to a column. Uses angles and data of `scan`, never its centre. Cost: three passes over
-/// up to 256 rows of every view; memory: 16 rows of each.
+/// Opposite views, up to 32 pairs, are mirror images about the axis: its place and roll are those under which
+/// their pictures differ least, from coarse ones to those of up to 256 columns. Half a turn without its end
+/// has two pairs, of its ends and what the line through the two views before them says. Nothing for cone
+/// beam, for samples that moved along columns, for fewer than 4 rows, where views are more than 15 degrees
+/// apart, and where find_center() finds none. Uses angles and data of `scan`, never its centre. Cost: about
+/// 100 passes over pictures of 64 columns, some 10 over each finer size; memory: the pictures, in double.
 VDVR_API std::optional<RollEstimate> find_roll(const ProjectionSet& scan);
 
 }  // namespace vdvr

@@ -85,16 +85,16 @@ def check(program):
         roll = json.loads(program.ok('center', scan, '--json', '--quiet', *options))['roll']
         program.expect(abs(roll['degrees'] - ROLL) < max(.05, 4 * roll['uncertainty']) and roll['uncertainty'] < .1, f'{scan}: {roll}')
         program.expect(roll['significant'] == (scan != 'own.h5'), f'{scan}: {roll}')
-    program.expect('--axis-roll 1.8' in program.ok('center', 'turn.h5', '--quiet'), 'center does not say what to do')
-    program.expect('--axis-roll 1.8' in program.ok('info', 'plain.h5', '--quiet'), 'info does not name the roll')
-    program.expect('axis leans' not in program.ok('info', 'still.h5', '--quiet'), 'info names a roll that is not')
+    program.expect('--axis-roll 1.8' in program.ok('center', 'turn.h5'), 'center does not say what to do')
+    program.expect('--axis-roll 1.8' in program.ok('info', 'plain.h5'), 'info does not name the roll')
+    program.expect('axis leans' not in program.ok('info', 'still.h5'), 'info names a roll that is not')
     # Certified; verify, audit and the others know the roll from the file.
     for scan, *options in (('plain.h5', '--axis-roll', ROLL), ('own.h5',), ('plain.h5', '--axis-roll', ROLL, '--binning', 2, '--pad', 'edge'),
                            ('plain.h5', '--axis-roll', ROLL, '--median', 3)):
         program.ok('build', scan, '--epsilon', '10%', '-o', 'v.vdvr', '--force', '--quiet', '--size', '10x10x1', *options)
         said = json.loads(program.ok('verify', 'v.vdvr', '--projections', scan, '--exhaustive', '--json', '--quiet'))
         program.expect(said['holds'], f'{scan} {options}: {said}')
-        program.ok('residual', 'v.vdvr', '--projections', scan, '--rows', '5', '--quiet')
+        program.ok('residual', scan, 'v.vdvr', '-o', 'r.png', '--force', '--rows', '5', '--quiet')
     program.ok('build', 'plain.h5', '--epsilon', '10%', '-o', 'v.vdvr', '--force', '--quiet', '--size', '10x10x1', '--axis-roll', ROLL)
     for other in (0, 1.7):
         run = program.run('verify', 'v.vdvr', '--projections', 'plain.h5', '--quiet', '--axis-roll', other)
