@@ -12,6 +12,7 @@ const std::set<std::string>& fields_with_options() {
                                            "flats_in_time",
                                            "shifts",
                                            "angles_file",
+                                           "axis_roll",
                                            "azimuth",
                                            "base",
                                            "beam",

@@ -45,6 +45,9 @@ void add_scan(Arguments& args) {
              "how far the sample stood in each view towards higher columns [and rows], in the unit of the "
              "pitch: "
              "numbers, or FILE.h5:/dataset; none: it stood still")
+      .value("axis-roll", "DEG",
+             "how far the axis of rotation leans in the detector's plane, in degrees, towards higher columns at "
+             "higher rows (parallel beam)")
       .value("beam", "cone|parallel",
              "cone: by the distances of an NXtomo file, which is read as parallel beam otherwise")
       .value("entry", "NAME", "the group of an HDF5 file that holds the scan, where there are several")
@@ -72,6 +75,10 @@ InputStatement input_statement(const Arguments& args, const InputStatement& stor
                     args.text("views")));
   if (const auto dark = level(args, "darks", 0)) s.dark = dark;
   if (const auto flat = level(args, "flats", 1)) s.flat = flat;
+  if (args.has("axis-roll")) {
+    s.axis_roll_deg = args.number_or("axis-roll", 0);
+    require_axis_roll(*s.axis_roll_deg, "--axis-roll");
+  }
   if (args.has("beam-current")) s.beam_current = args.text("beam-current");
   if (args.has("transmission") && args.has("line-integrals"))
     throw InputError("--transmission and --line-integrals exclude each other");

@@ -38,8 +38,11 @@ Json grid_json(const Grid& g) {
 
 Json geometry_json(const ParallelGeometry& rows) {
   const ParallelGeometry g = own_detector(rows);
-  Json j = {{"views", g.views()},   {"rows", g.rows},     {"columns", g.columns}, {"pitch_u", g.pitch_u},
-            {"pitch_v", g.pitch_v}, {"center", g.center}, {"unit", g.unit}};
+  Json j = {{"views", g.views()},   {"rows", g.rows},       {"columns", g.columns},
+            {"pitch_u", g.pitch_u}, {"pitch_v", g.pitch_v}, {"center", stated_center({}, rows)},
+            {"unit", g.unit}};
+  if (g.axis_roll_deg != 0) j["axis_roll"] = g.axis_roll_deg;
+  if (g.extension.cut > 0) j["columns_cut"] = g.extension.cut;
   if (rows.extension.before > 0 || rows.extension.after > 0)
     j["longer_rows"] = {{"half_acquisition", rows.extension.half_acquisition.value_or(false)},
                         {"pad", text_of(rows.extension.padding)},

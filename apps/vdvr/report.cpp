@@ -387,7 +387,7 @@ std::string input(const RunReport& run) {
         fmt::format("{:.6g}\xC2\xB0 and {:.6g}\xC2\xB0", g.theta_rad.front() * degrees_per_radian,
                     g.theta_rad.back() * degrees_per_radian));
   }
-  add(pairs, "centre", fmt::format("column {:.4f} ({})", g.center, escaped(r.center_source)));
+  add(pairs, "centre", fmt::format("column {:.4f} ({})", stated_center({}, g), escaped(r.center_source)));
   if (run.scan.cone) add_cone(run.scan, pairs);
   add(pairs, "dead pixels", fmt::format("{} replaced", r.dead_pixels));
   if (r.air_background) add(pairs, "background", "linear air background taken off");

@@ -140,6 +140,18 @@ Preparation extended_by(const RowExtension& e) {
 
 }  // namespace
 
+std::string words_of(const RollEstimate& roll, double stated) {
+  // Another digit than those that are known.
+  const int digits =
+      std::clamp(1 - static_cast<int>(std::floor(std::log10(std::max(1e-5, roll.uncertainty_deg)))), 1, 5);
+  const std::string found = fmt::format("{:.{}f} +- {:.1g} degrees, by {}", roll.roll_deg, digits,
+                                        std::max(1e-5, roll.uncertainty_deg), roll.method);
+  if (roll.significant)
+    return fmt::format("{}{}: the axis leans; --axis-roll {:.{}f}", found,
+                       stated == 0 ? "" : fmt::format(", not {:g}", stated), roll.roll_deg, digits);
+  return found + (stated == 0 ? ": none to speak of" : ", as is stated");
+}
+
 void print_scan(const ProjectionSet& scan, const Understood* understood) {
   const ParallelGeometry g = own_detector(scan.geometry);
   const InputReport& r = scan.report;
@@ -147,7 +159,9 @@ void print_scan(const ProjectionSet& scan, const Understood* understood) {
              g.columns, g.rows, scan.cone ? "cone beam" : "parallel beam");
   if (understood) print_understood(scan, *understood);
   fmt::print("  pitch        {:.6g} x {:.6g} {}\n", g.pitch_u, g.pitch_v, g.unit);
-  fmt::print("  centre       column {:.4f} ({})\n", g.center, r.center_source);
+  fmt::print("  centre       column {:.4f} ({})\n", stated_center({}, scan.geometry), r.center_source);
+  if (g.axis_roll_deg != 0)
+    fmt::print("  axis roll    {:g} degrees in the detector's plane\n", g.axis_roll_deg);
   if (const RowExtension& e = scan.geometry.extension; e.before > 0 || e.after > 0)
     fmt::print("  rows         longer: {} columns before, {} after, for {}\n", e.before, e.after,
                text_of(extended_by(e)));

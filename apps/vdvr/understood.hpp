@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "apps/common/common_options.hpp"
+#include "vdvr/expert/find_roll.hpp"
 #include "vdvr/expert/projections.hpp"
 #include "vdvr/expert/understood.hpp"
 
@@ -12,6 +13,9 @@ namespace vdvr::cli {
 
 inline constexpr double degrees_per_radian = 180 / std::numbers::pi;
 
+/// "1.49 +- 0.004 degrees, by the centres of 16 bands of rows: --axis-roll 1.49"; `stated`: what was read
+/// with.
+std::string words_of(const RollEstimate& roll, double stated);
 Json understood_json(const ProjectionSet& scan, const Understood& understood);
 /// With `understood`, what was understood too.
 void print_scan(const ProjectionSet& scan, const Understood* understood = nullptr);

@@ -89,12 +89,17 @@ std::string options_json(const Plan& plan, const CertifyOptions& options, const 
                    {"theta_rad", geometry.theta_rad}};
   if (!geometry.column_shift.empty()) j["geometry"]["column_shift"] = geometry.column_shift;
   if (!geometry.row_shift.empty()) j["geometry"]["row_shift"] = geometry.row_shift;
+  if (geometry.axis_roll_deg != 0) {
+    j["geometry"]["axis_roll"] = geometry.axis_roll_deg;
+    j["geometry"]["columns_cut"] = geometry.extension.cut;
+  }
   if (const RowExtension& e = geometry.extension; e.before > 0 || e.after > 0)
-    j["geometry"]["extension"] = {{"half_acquisition", e.half_acquisition.value_or(false)},
-                                  {"pad", text_of(e.padding)},
-                                  {"before", e.before},
-                                  {"after", e.after},
-                                  {"center", stated_center(plan.field, geometry)}};
+    j["geometry"]["extension"] = {
+        {"half_acquisition", e.half_acquisition.value_or(false)},
+        {"pad", text_of(e.padding)},
+        {"before", e.before},
+        {"after", e.after},
+        {"center", stated_center(plan.field, geometry) - static_cast<double>(e.cut)}};
   if (!scan.cone) return j.dump();
   nlohmann::ordered_json& cone = j["geometry"]["cone"];
   cone["redundancy"] = text_of(scan.cone->redundancy);

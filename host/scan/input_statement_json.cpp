@@ -18,6 +18,7 @@ nlohmann::json json_of(const InputStatement& s) {
   if (s.values) json["values"] = text_of(*s.values);
   if (s.angle_unit) json["angle_unit"] = text_of(*s.angle_unit);
   if (!s.beam_current.empty()) json["beam_current"] = s.beam_current;
+  if (s.axis_roll_deg) json["axis_roll"] = *s.axis_roll_deg;
   return json;
 }
 
@@ -43,6 +44,8 @@ InputStatement input_statement_of(const nlohmann::json& json) {
       s.beam_current = value.get<std::string>();
     } else if (name == "dark") {
       s.dark = level(name, value);
+    } else if (name == "axis_roll") {
+      s.axis_roll_deg = level(name, value);
     } else if (name == "flat") {
       s.flat = level(name, value);
     } else if (name == "values" && value.is_string() && sample_values_of(value.get<std::string>())) {

@@ -121,6 +121,11 @@ void set_shifts(RawScan& scan, const std::string& name, ParallelGeometry& g) {
     for (const double s : scan.shift_u) g.column_shift.push_back(s / g.pitch_u);
     for (const double s : scan.shift_v) g.row_shift.push_back(s / g.pitch_v);
   }
+  g.axis_roll_deg = scan.axis_roll_deg;
+  if (g.axis_roll_deg != 0)
+    scan.notes.push_back(
+        fmt::format("axis roll: {:g} degrees in the detector's plane, as {} says; F follows it",
+                    g.axis_roll_deg, scan.axis_roll_source));
   if (is_still(g.column_shift)) g.column_shift.clear();
   if (is_still(g.row_shift)) g.row_shift.clear();
   if (g.column_shift.empty() && g.row_shift.empty()) return;

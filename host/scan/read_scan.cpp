@@ -218,13 +218,16 @@ std::string name_of(const fs::path& path, bool folder) {
 }
 
 // In columns of the file.
-std::string note_of(const CenterEstimate& found, int binning) {
-  const double column = unbinned_center(found.center, binning);
+std::string note_of(const CenterEstimate& found, std::int64_t cut, int binning) {
+  const auto column_of = [&](double center) {
+    return unbinned_center(center + static_cast<double>(cut), binning);
+  };
+  const double column = column_of(found.center);
   std::string others;
   for (const CenterWitness& w : found.others)
     if (w.quality >= 0.5)
-      others += fmt::format("{} {} {:.2f}", others.empty() ? "; beside it" : ",", w.method,
-                            unbinned_center(w.center, binning));
+      others +=
+          fmt::format("{} {} {:.2f}", others.empty() ? "; beside it" : ",", w.method, column_of(w.center));
   if (!found.sure)
     return fmt::format(
         "centre of rotation UNSURE: column {:.2f} from {}, but {}{}; look at slices around it with `vdvr "
@@ -238,23 +241,24 @@ void choose_center(const fs::path& path, const io::RawScan& raw, const ScanOptio
                    ProjectionSet& scan) {
   ParallelGeometry& g = scan.geometry;
   InputReport& r = scan.report;
+  const auto cut = static_cast<double>(g.extension.cut);  // what is stated counts the detector's columns
   if (options.center) {
-    g.center = *options.center;
+    g.center = *options.center - cut;
     r.center_source = "option";
   } else if (raw.center) {
-    g.center = binned_center(*raw.center, options.preparation.binning);
+    g.center = binned_center(*raw.center, options.preparation.binning) - cut;
     r.center_source = "file";
   } else if (const auto found = find_center(scan)) {
     g.center = found->center;
     r.center_source = "found";
-    r.notes.push_back(note_of(*found, options.preparation.binning));
+    r.notes.push_back(note_of(*found, g.extension.cut, options.preparation.binning));
   } else {
     g.center = 0.5 * static_cast<double>(g.columns - 1);
     r.center_source = "default";
     r.notes.push_back(
         fmt::format("centre of rotation assumed in the detector's middle, column {}: the views do not tell; "
                     "`vdvr center` draws slices to choose from, `center` sets it",
-                    unbinned_center(g.center, options.preparation.binning)));
+                    unbinned_center(g.center + cut, options.preparation.binning)));
   }
   require_on_detector(path, g.center, g.columns, options);
 }

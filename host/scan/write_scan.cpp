@@ -43,11 +43,15 @@ void write_geometry(io::hdf5::Writer& file, const ParallelGeometry& g) {
   file.attribute(kData, "pitch_u", g.pitch_u);
   file.attribute(kData, "pitch_v", g.pitch_v);
   file.attribute(kData, "center", g.center);
-  if (!g.column_shift.empty() || !g.row_shift.empty()) {
+  // Of rows that were brought upright, or to common heights, what is left.
+  const bool rows_moved = !g.row_shift.empty() && !g.extension.common_heights;
+  if (g.axis_roll_deg != 0 && !g.extension.common_heights)
+    file.attribute(kData, "axis_roll", g.axis_roll_deg);
+  if (!g.column_shift.empty() || rows_moved) {
     std::vector<double> shifts;  // [view][column, row], in the unit
     for (std::size_t k = 0; k < g.theta_rad.size(); ++k) {
       shifts.push_back(g.column_shift.empty() ? 0 : g.column_shift[k] * g.pitch_u);
-      shifts.push_back(g.row_shift.empty() ? 0 : g.row_shift[k] * g.pitch_v);
+      shifts.push_back(rows_moved ? g.row_shift[k] * g.pitch_v : 0);
     }
     file.dataset("/exchange/shifts", {g.theta_rad.size(), 2}, std::span<const double>(shifts),
                  {g.theta_rad.size(), 2});

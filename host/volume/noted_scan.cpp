@@ -49,7 +49,10 @@ std::optional<ProjectionSet> noted_geometry(const Certificate& certificate) {
         throw FileError(fmt::format("certificate, options.geometry.{}: one number is needed a view", name));
     }
     if (g.contains("extension")) geometry.extension = extension_of(g.at("extension"));
-    geometry.extension.common_heights = !geometry.row_shift.empty();
+    geometry.axis_roll_deg = g.value("axis_roll", 0.0);
+    require_axis_roll(geometry.axis_roll_deg, "certificate, options.geometry.axis_roll");
+    geometry.extension.cut = g.value("columns_cut", std::int64_t{0});
+    geometry.extension.common_heights = !geometry.row_shift.empty() || geometry.axis_roll_deg != 0;
     if (g.contains("cone")) {
       const auto& cone = g.at("cone");
       const auto redundancy = redundancy_of(cone.at("redundancy").get<std::string>());

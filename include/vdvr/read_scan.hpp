@@ -30,7 +30,8 @@ VDVR_API ProjectionSet read_scan(const std::filesystem::path& path, const ScanOp
 VDVR_API std::optional<LineIntegralNoise> read_line_noise(const std::filesystem::path& path,
                                                           const ScanOptions& options = {});
 
-/// /exchange/data float32 [angle][v][u] with description = "line integrals", pitch_u, pitch_v, center, unit;
+/// /exchange/data float32 [angle][v][u] with description = "line integrals", pitch_u, pitch_v, center, unit,
+/// axis_roll where the axis leans;
 /// theta in degrees. Written whole or not at all.
 VDVR_API void write_data_exchange(const std::filesystem::path& path, const ProjectionSet& scan);
 

@@ -22,7 +22,9 @@
 #include "vdvr/device.hpp"
 #include "vdvr/expert/certify.hpp"
 #include "vdvr/expert/extend_rows.hpp"
+#include "vdvr/expert/field_options.hpp"
 #include "vdvr/expert/find_center.hpp"
+#include "vdvr/expert/find_roll.hpp"
 #include "vdvr/expert/preparation.hpp"
 #include "vdvr/expert/reconstruct.hpp"
 #include "vdvr/expert/scan_of_array.hpp"
@@ -195,6 +197,7 @@ void add_projections(nb::module_& m) {
       .def_rw("values", &InputStatement::values)
       .def_rw("angle_unit", &InputStatement::angle_unit)
       .def_rw("beam_current", &InputStatement::beam_current)
+      .def_rw("axis_roll_deg", &InputStatement::axis_roll_deg)
       .def("__str__", [](const InputStatement& s) { return text_of(s); });
   nb::class_<Understood>(m, "Understood", "What was understood of a scan's files.")
       .def(nb::init<>())
@@ -219,6 +222,7 @@ void add_projections(nb::module_& m) {
       .def_rw("half_acquisition", &ArrayScan::half_acquisition)
       .def_rw("padding", &ArrayScan::padding)
       .def_rw("shifts", &ArrayScan::shifts)
+      .def_rw("axis_roll_deg", &ArrayScan::axis_roll_deg)
       .def_rw("pitch_u", &ArrayScan::pitch_u)
       .def_rw("pitch_v", &ArrayScan::pitch_v)
       .def_rw("unit", &ArrayScan::unit)
@@ -226,7 +230,8 @@ void add_projections(nb::module_& m) {
   nb::class_<ProjectionSet>(m, "ProjectionSet")
       .def_prop_ro("columns", [](const ProjectionSet& s) { return own_detector(s.geometry).columns; })
       .def_prop_ro("rows", [](const ProjectionSet& s) { return s.geometry.rows; })
-      .def_prop_ro("center", [](const ProjectionSet& s) { return own_detector(s.geometry).center; })
+      .def_prop_ro("center", [](const ProjectionSet& s) { return stated_center({}, s.geometry); })
+      .def_prop_ro("axis_roll_deg", [](const ProjectionSet& s) { return s.geometry.axis_roll_deg; })
       .def_prop_ro("pitch",
                    [](const ProjectionSet& s) {
                      return std::array{s.geometry.pitch_u, s.geometry.pitch_v};
@@ -320,6 +325,20 @@ void add_projections(nb::module_& m) {
       .def_ro("sure", &CenterEstimate::sure, "Whether two methods agree within a quarter of a column.")
       .def_ro("doubt", &CenterEstimate::doubt, "Why it is not sure.")
       .def_ro("others", &CenterEstimate::others, "What the other methods say.");
+  nb::class_<RollEstimate>(m, "RollEstimate", "How far the axis leans in the detector's plane.")
+      .def_ro("roll_deg", &RollEstimate::roll_deg, "Degrees; towards higher columns at higher rows.")
+      .def_ro("uncertainty_deg", &RollEstimate::uncertainty_deg, "One standard deviation.")
+      .def_ro("significant", &RollEstimate::significant, "Whether it is off what the scan was read with.")
+      .def_ro("pairs", &RollEstimate::pairs, "Of views from either side.")
+      .def_ro("method", &RollEstimate::method);
+  m.def(
+      "find_roll",
+      [](const ProjectionSet& scan) {
+        std::optional<RollEstimate> found;
+        run_long(nb::none(), [&](const Progress&) { found = find_roll(own_rows(scan)); });
+        return found;
+      },
+      "scan"_a);
   m.def(
       "find_center",
       [](const ProjectionSet& scan) {

@@ -32,13 +32,13 @@ from ._core import (
 from ._audit import audit
 from ._certify import build, plan, verify, verify_picture
 from ._devices import device, devices
-from ._scans import Scan, find_center, read_scan, recon
+from ._scans import Scan, find_center, find_roll, read_scan, recon
 from ._volume import CertifiedPicture, Volume, open, transfer_presets
 
 __all__ = [
     "BuildError", "CenterEstimate", "CertifiedPicture", "DeviceError", "Error", "FileError", "Grid", "InputError",
     "MismatchError", "PictureVerification", "Plan", "ResourceError", "Scan", "ToleranceError", "TransferFunction",
-    "Verification", "Viewer", "Volume", "__version__", "audit", "build", "device", "devices", "find_center", "open", "plan",
+    "Verification", "Viewer", "Volume", "__version__", "audit", "build", "device", "devices", "find_center", "find_roll", "open", "plan",
     "read_scan", "recon", "transfer_presets", "verify", "verify_picture",
 ]
 

@@ -55,6 +55,7 @@ class Scan:
     pad : "edge" or "mirror": how rows of objects wider than the detector go on beyond it, tapering to zero.
     shifts : how far the sample stood in each view towards higher columns, or columns and rows, in `unit`: array
         [view] or [view, 2].
+    axis_roll : degrees by which the axis leans in the detector's plane, towards higher columns at higher rows.
 
     Raises
     ------
@@ -79,6 +80,7 @@ class Scan:
         half_acquisition: Optional[bool] = None,
         pad: str = "none",
         shifts: Optional["ArrayLike"] = None,
+        axis_roll: float = 0.0,
     ) -> None:
         described = _core.ArrayScan()
         described.angles_deg = [float(a) for a in np.asarray(angles_deg, dtype=np.float64).ravel()]
@@ -89,6 +91,7 @@ class Scan:
         described.half_acquisition = half_acquisition
         described.padding = choice(_core.Padding, pad, "pad")
         described.name = name
+        described.axis_roll_deg = number(axis_roll, "axis_roll")
         if shifts is not None:
             moved = np.asarray(shifts, dtype=np.float64)
             if moved.ndim == 1:
@@ -129,6 +132,11 @@ class Scan:
     def center(self) -> float:
         """Column onto which the axis projects."""
         return self._core.center
+
+    @property
+    def axis_roll(self) -> float:
+        """Degrees by which the axis leans in the detector's plane; rows here stand upright on it."""
+        return self._core.axis_roll_deg
 
     @property
     def center_source(self) -> str:
@@ -191,6 +199,7 @@ def read_scan(
     angles_file: Optional[Path] = None,
     angle_unit: Optional[str] = None,
     shifts: Optional[Path] = None,
+    axis_roll: Optional[float] = None,
     beam: Optional[str] = None,
     binning: int = 1,
     median: int = 1,
@@ -223,6 +232,8 @@ def read_scan(
     angle_unit : "degrees" or "radians", of the angles, whatever their file says.
     shifts : a file of numbers, or "FILE.h5:/dataset": how far the sample stood in each view towards higher columns
         [and rows], in the unit of the pitch; "none": it stood still, whatever the scan's files say.
+    axis_roll : degrees by which the axis leans in the detector's plane, towards higher columns at higher rows,
+        whatever the scan's files say.
     beam : "cone" or "parallel", of an NXtomo file that says it by its distances alone.
     binning : columns and rows that become one.
     median, gaussian : side of the median's window; standard deviations in columns and rows.
@@ -254,6 +265,7 @@ def read_scan(
     options.beam = None if beam is None else choice(_core.Beam, beam, "beam")
     options.input = _statement(entry, views, darks, flats, transmission, line_integrals, angle_unit)
     options.input.beam_current = beam_current or ""
+    options.input.axis_roll_deg = None if axis_roll is None else number(axis_roll, "axis_roll")
     options.follow_links = follow_links
     options.max_memory_bytes = _core.half_of_free_memory() if max_memory is None else int(max_memory)
     preparation = _core.Preparation()
@@ -329,6 +341,14 @@ def find_center(scan: Scan) -> Optional["_core.CenterEstimate"]:
     `scan.center` is not looked at. An estimate that is not `sure` may be off by any number of columns.
     """
     return _core.find_center(scan._core)
+
+
+def find_roll(scan: Scan) -> Optional["_core.RollEstimate"]:
+    """How far the axis leans in the detector's plane, from the data, and how sure that is; None where rows do not tell.
+
+    What the scan was read with is in it: of `Scan(..., axis_roll=1.5)` it is about 1.5.
+    """
+    return _core.find_roll(scan._core)
 
 
 def recon(

@@ -12,6 +12,7 @@
 #include "host/scan/prepare/common_heights.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/scans.hpp"
+#include "tests/support/smooth_balls.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/certify.hpp"
@@ -23,6 +24,8 @@
 using namespace vdvr;
 using support::device;
 using vdvr::testing::noise_scan;
+using vdvr::testing::off_by;
+using vdvr::testing::smooth_balls;
 
 namespace {
 
@@ -36,62 +39,15 @@ std::vector<std::array<double, 2>> drawn(std::int64_t views, double along_u, dou
   return shifts;
 }
 
-// Balls of density d (1 - r^2 / R^2)^3: smooth everywhere, so that F is theirs. A line at the distance s from
-// a ball's middle has d 32/35 R (1 - s^2 / R^2)^(7/2).
-struct Ball {
-  double d, x, y, z, R;
-};
-const std::vector<Ball> balls{{1, 4, -3, 0.5, 12}, {0.7, -9, 6, -1, 8}};
-
-double power_of(double squared, double R, double exponent) {
-  return squared < R * R ? std::pow(1 - squared / (R * R), exponent) : 0;
-}
-
-double density_at(const Vec3& p) {
-  double sum = 0;
-  for (const Ball& b : balls) {
-    const double x = p[0] - b.x, y = p[1] - b.y, z = p[2] - b.z;
-    sum += b.d * power_of(x * x + y * y + z * z, b.R, 3);
-  }
-  return sum;
-}
-
-Phantom object() {
-  Phantom phantom;
-  phantom.name = "smooth balls";
-  phantom.line_integral = [](double theta, double u, double v) {
-    double sum = 0;
-    for (const Ball& b : balls) {
-      const double s = u - b.x * std::cos(theta) - b.y * std::sin(theta), z = v - b.z;
-      sum += b.d * 32 / 35 * b.R * power_of(s * s + z * z, b.R, 3.5);
-    }
-    return sum;
-  };
-  return phantom;
-}
-
 ProjectionSet simulated(const std::vector<std::array<double, 2>>& shifts, int views = 90) {
   SimulateOptions o;
   o.angles = views;
   o.columns = 57;
   o.rows = 25;
   o.shifts = shifts;
-  ProjectionSet scan = simulate(object(), o);
+  ProjectionSet scan = simulate(smooth_balls(), o);
   common_heights(scan, {}, 0, {});
   return scan;
-}
-
-// The largest difference of F from the density, of 1.
-double off_by(const ProjectionSet& scan) {
-  std::vector<Vec3> points;
-  for (double z = -4; z <= 4; z += 2)
-    for (double y = -12; y <= 12; y += 3)
-      for (double x = -12; x <= 12; x += 3) points.push_back({x, y, z});
-  const std::vector<double> F = ExactField(scan, {}).at(points);
-  double worst = 0;
-  for (std::size_t i = 0; i < points.size(); ++i)
-    worst = std::max(worst, std::abs(F[i] - density_at(points[i])));
-  return worst;
 }
 
 ProjectionSet shifted_noise(std::int64_t views, std::int64_t rows, std::int64_t columns, double u, double v,
@@ -211,7 +167,7 @@ BOOST_AUTO_TEST_CASE(the_centre_is_found_behind_random_shifts) {
   o.rows = 5;
   o.detector_offset = 2.3;
   o.shifts = drawn(120, 3, 0);
-  const auto found = find_center(simulate(object(), o));
+  const auto found = find_center(simulate(smooth_balls(), o));
   BOOST_REQUIRE(found.has_value());
   BOOST_TEST(std::abs(found->center - (28 - 2.3)) < 0.25);
 }

@@ -252,6 +252,30 @@ assert not os.path.exists("middle.vdvr.journal")
 assert vdvr.open("middle.vdvr").content_sha256 == resumed.content_sha256 == vdvr.build(middle, "10%").content_sha256
 raises(vdvr.InputError, "exists already", lambda: vdvr.build(middle, "10%", save="middle.vdvr"))
 
+# --- an axis that leans: followed, found, certified, and upright in what is saved ---
+roll, (rows_, columns_) = 2.0, (25, 61)
+c_, s_ = np.cos(np.radians(roll)), np.sin(np.radians(roll))
+along_u, along_v = np.meshgrid(np.arange(columns_) - 30.0, np.arange(rows_) - 12.0)
+away, height = along_u * c_ - along_v * s_, along_u * s_ + along_v * c_
+turned = np.arange(90) * 2.0
+leaning = np.array([np.sqrt(np.maximum(0, 81 - (away - 6 * np.cos(t)) ** 2)) * 2 / (1 + np.exp(height - 6))
+                    for t in np.radians(turned)], dtype=np.float32)
+scan = vdvr.Scan(leaning, turned, axis_roll=roll)
+assert scan.axis_roll == roll and scan.shape == (90, 22, 59) and abs(scan.center - 30) < 0.05, (scan.shape, scan.center)
+found = vdvr.find_roll(vdvr.Scan(leaning, turned))
+print(f"roll found: {found.roll_deg:.3f} +- {found.uncertainty_deg:.3f}, of {roll}")
+assert found.significant and abs(found.roll_deg - roll) < max(0.05, 4 * found.uncertainty_deg)
+assert not vdvr.find_roll(scan).significant and abs(vdvr.find_roll(scan).roll_deg - roll) < 0.1
+raises(vdvr.InputError, "from -10 to 10", lambda: vdvr.Scan(leaning, turned, axis_roll=float("nan")))
+scan.save("upright.h5")
+again = vdvr.read_scan("upright.h5")
+assert again.axis_roll == 0 and np.array_equal(again.data, scan.data)
+vdvr.Scan(leaning, turned).save("leaning.h5")
+held = vdvr.read_scan("leaning.h5", axis_roll=roll)
+assert np.array_equal(held.data, scan.data)
+small = vdvr.build(held, "10%", size=(8, 8, 2))
+assert vdvr.verify(small, held).holds
+
 # --- VTK's boxes are V's own samples ---
 boxes, seen = pyvista.wrap(volume.to_vtk()), {}
 assert boxes.n_blocks > 0 and boxes.field_data["unit"][0] == "pixel"

@@ -301,6 +301,25 @@ inline void draw_shifts(std::uint64_t seed, ParallelGeometry& g, std::string& na
       std::string(", shifted") + (along_columns ? " along columns" : "") + (along_rows ? " along rows" : "");
 }
 
+/// One case in five of those with rows to spare is of an axis that leans, by as much as leaves a row. Drawn apart, so
+/// that other cases stay as they are.
+inline void draw_roll(std::uint64_t seed, ProjectionSet& scan, std::string& name) {
+  Random random(seed * 0x8ebc6af09c88c6e3u + 13);
+  ParallelGeometry& g = scan.geometry;
+  if (!chance(random, 0.3) || g.rows < 2) return;
+  double range = 0;
+  if (!g.row_shift.empty()) {
+    const auto [least, most] = std::minmax_element(g.row_shift.begin(), g.row_shift.end());
+    range = *most - *least;
+  }
+  // Shifts along columns are seen along the axis too, by no more than a fifth of them.
+  const double spare = static_cast<double>(g.rows - 1) - range, wide = 1.5 * static_cast<double>(g.columns);
+  const double most = std::min(spare / wide, 0.17) * 180 / std::numbers::pi;
+  if (!(most > 0.05)) return;
+  g.axis_roll_deg = (chance(random, 0.5) ? 1 : -1) * most * (0.2 + 0.8 * unit(random));
+  name += ", axis leans by " + std::to_string(g.axis_roll_deg);
+}
+
 inline void draw_scan(std::uint64_t of_shifts, Random& random, Case& c) {
   ParallelGeometry g = draw_geometry(random, c.name);
   draw_shifts(of_shifts, g, c.name);
@@ -507,6 +526,7 @@ inline Case draw_case(std::uint64_t seed) {
   Random random(seed * 0x9e3779b97f4a7c15u + 1);
   Case c;
   draw_scan(seed, random, c);
+  draw_roll(seed, c.scan, c.name);
   common_heights(c.scan, {}, 0, {});
   c.scan.report.notes.clear();
   draw_longer_rows(seed, c);

@@ -80,6 +80,10 @@ int scan_info(const std::filesystem::path& path, const Arguments& args, const Co
   const ProjectionSet scan = load_scan(path, args, {}, progress.callback(), &understood);
   const NoiseFound noise = noise_of_scan(path, args, {}, scan);
   const Grid grid = make_grid(scan, {});
+  // Where nobody states a roll, rows that say one are worth a word.
+  std::optional<RollEstimate> roll;
+  if (scan.geometry.axis_roll_deg == 0 && !understood.stated.axis_roll_deg) roll = find_roll(scan);
+  if (roll && !roll->significant) roll.reset();
   const ProjectionSet measured = own_rows(scan);
   const auto range = std::minmax_element(measured.data.begin(), measured.data.end());
   progress.clear();
@@ -91,9 +95,11 @@ int scan_info(const std::filesystem::path& path, const Arguments& args, const Co
                {"range", {*range.first, *range.second}},
                {"default_grid", grid_json(grid)}};
   if (scan.cone) json["cone"] = cone_json(scan);
+  if (roll) json["roll_found"] = {{"degrees", roll->roll_deg}, {"uncertainty", roll->uncertainty_deg}};
   json["noise"] = noise_json(noise);
   print_result(common, json, [&] {
     print_scan(scan, &understood);
+    if (roll) fmt::print("  axis roll    {}\n", words_of(*roll, 0));
     print_noise(noise);
     fmt::print("  integrals    {:.6g} to {:.6g}\n", *range.first, *range.second);
     print_grid(grid);

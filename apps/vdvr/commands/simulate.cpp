@@ -35,6 +35,9 @@ void add_options(Arguments& args) {
              "how far the object stands in each view towards higher columns [and rows], in world units "
              "(parallel "
              "beam)")
+      .value("axis-roll", "DEG",
+             "how far the axis leans in the detector's plane, towards higher columns at higher rows (parallel "
+             "beam; default 0)")
       .flag("point", "line integrals at the pixel centres")
       .flag("band-limited", "ideal low-pass at the detector's Nyquist frequency (default)")
       .value("noise-sigma", "S", "Gaussian noise, as a fraction of the largest line integral")
@@ -167,6 +170,11 @@ void apply_scan_options(const Arguments& args, SimulateOptions& scan) {
   if (args.has("shifts")) {
     if (scan.cone) throw InputError("--shifts: is of parallel beam");
     scan.shifts = read_shifts(args.path("shifts"), scan.angles);
+  }
+  if (args.has("axis-roll")) {
+    if (scan.cone) throw InputError("--axis-roll: is of parallel beam; cone beam has --tilt");
+    scan.axis_roll_deg = args.number_or("axis-roll", 0);
+    require_axis_roll(scan.axis_roll_deg, "--axis-roll");
   }
   const CommonOptions common = common_options(args);
   scan.max_memory_bytes = common.max_memory;

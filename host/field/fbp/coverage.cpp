@@ -290,10 +290,12 @@ std::vector<std::string> check_scan(const ParallelGeometry& g) {
     for (const double s : *shift)
       if (!std::isfinite(s)) throw InputError("a shift is not finite");
   }
-  if (!g.row_shift.empty() && !g.extension.common_heights)
+  require_axis_roll(g.axis_roll_deg, "axis roll");
+  if ((!g.row_shift.empty() || g.axis_roll_deg != 0) && !g.extension.common_heights)
     throw InputError(
-        "views see other heights, and their rows were not brought to common ones when they were read "
-        "(common_heights)");
+        "views see other heights, or the axis leans, and their rows were not brought to common heights when "
+        "they "
+        "were read (common_heights)");
   if (!g.extension.half_acquisition && g.column_shift.empty() && looks_half_acquired(g))
     throw InputError(fmt::format(
         "the axis projects onto column {:.2f} of {} in a scan all around: half acquisition, whose rows are "

@@ -59,6 +59,8 @@ ParallelGeometry geometry_of(const ArrayScan& d) {
   }
   for (std::vector<double>* shift : {&g.column_shift, &g.row_shift})
     if (std::all_of(shift->begin(), shift->end(), [](double s) { return s == 0; })) shift->clear();
+  require_axis_roll(d.axis_roll_deg, "axis_roll");
+  g.axis_roll_deg = d.axis_roll_deg;
   return g;
 }
 
@@ -76,6 +78,7 @@ std::string hash_of(const SampleArray& data, const ArrayScan& d) {
       fmt::format("{} {} {} {} {} {}", d.angles_deg.size(), d.rows, d.columns, d.pitch_u, d.pitch_v, d.unit);
   for (const double angle : d.angles_deg) text += fmt::format(" {}", angle);
   for (const auto& shift : d.shifts) text += fmt::format(" {} {}", shift[0], shift[1]);
+  if (d.axis_roll_deg != 0) text += fmt::format(" roll {}", d.axis_roll_deg);
   text += '\n';
   Sha256 hash;
   hash.update(text.data(), text.size());
@@ -86,19 +89,20 @@ std::string hash_of(const SampleArray& data, const ArrayScan& d) {
 void set_center(ProjectionSet& scan, const std::optional<double>& given) {
   ParallelGeometry& g = scan.geometry;
   if (given) {
-    g.center = *given;
+    g.center = *given - static_cast<double>(g.extension.cut);
     scan.report.center_source = "option";
   } else if (const auto found = find_center(scan)) {
     g.center = found->center;
     scan.report.center_source = "found";
-    scan.report.notes.push_back(fmt::format("centre of rotation found from {}: column {:.2f}{}{}",
-                                            found->method, found->center,
-                                            found->sure ? "" : ", UNSURE: ", found->doubt));
+    scan.report.notes.push_back(fmt::format(
+        "centre of rotation found from {}: column {:.2f}{}{}", found->method,
+        found->center + static_cast<double>(g.extension.cut), found->sure ? "" : ", UNSURE: ", found->doubt));
   } else {
     g.center = 0.5 * static_cast<double>(g.columns - 1);
     scan.report.center_source = "default";
-    scan.report.notes.push_back(fmt::format(
-        "centre of rotation assumed in the detector's middle, column {}: the views do not tell", g.center));
+    scan.report.notes.push_back(
+        fmt::format("centre of rotation assumed in the detector's middle, column {}: the views do not tell",
+                    g.center + static_cast<double>(g.extension.cut)));
   }
   if (!(g.center >= -0.5 && g.center <= static_cast<double>(g.columns) - 0.5))
     throw InputError(

@@ -75,18 +75,42 @@ View unbinned(const ProjectionSet& prepared, const Window& window, std::int64_t 
   return out;
 }
 
+// Heights and columns that all views see are not always a whole number of binned ones.
+struct DetectorSize {
+  std::int64_t rows, columns;
+  [[nodiscard]] std::size_t nearest(std::int64_t row, std::int64_t column) const {
+    return at(std::clamp<std::int64_t>(row, 0, rows - 1) * columns +
+              std::clamp<std::int64_t>(column, 0, columns - 1));
+  }
+};
+
+// Noise of so many pixels for others about the same middle.
+LineIntegralNoise fitted(LineIntegralNoise noise, const DetectorSize& from, const ParallelGeometry& to) {
+  if (from.rows == to.rows && from.columns == to.columns) return noise;
+  for (std::vector<float>* values : {&noise.photon, &noise.read}) {
+    if (std::ssize(*values) <= 1) continue;
+    std::vector<float> out;
+    for (std::int64_t row = 0; row < to.rows; ++row)
+      for (std::int64_t column = 0; column < to.columns; ++column)
+        out.push_back((*values)[from.nearest(row + (from.rows - to.rows) / 2,
+                                             column + (from.columns - to.columns) / 2)]);
+    *values = std::move(out);
+  }
+  return noise;
+}
+
 // A view with two noises, and the difference of these. Box and Muller 1958.
 struct NoisyPair {
   View one, other, difference;
 };
-NoisyPair with_noise(const View& view, const PixelVariance& variance, std::int64_t first_pixel,
-                     std::int64_t columns, std::int64_t k) {
+NoisyPair with_noise(const View& view, const PixelVariance& variance, std::int64_t first_row,
+                     const DetectorSize& detector, std::int64_t k) {
   std::mt19937_64 random(static_cast<std::uint64_t>(20060301 + k));
   const auto uniform = [&] { return (static_cast<double>(random() >> 11) + 0.5) * 0x1p-53; };
   NoisyPair out{view, view, view};
   for (std::int64_t j = 0; j < view.rows; ++j)
     for (std::int64_t i = 0; i < view.columns; ++i) {
-      const double sigma = std::sqrt(variance(at(first_pixel + j * columns + i), view.at(i, j))),
+      const double sigma = std::sqrt(variance(detector.nearest(first_row + j, i), view.at(i, j))),
                    length = sigma * std::sqrt(-2 * std::log(uniform())), angle = 2 * pi * uniform(),
                    a = length * std::cos(angle), b = length * std::sin(angle);
       out.one.at(i, j) += a;
@@ -108,6 +132,7 @@ ProjectionSet like(const ProjectionSet& prepared, const Window& window) {
   out.geometry.theta_rad.clear();
   out.geometry.column_shift.clear();  // of views that are left out too, and noise does not follow them
   out.geometry.row_shift.clear();
+  out.geometry.axis_roll_deg = 0;
   for (const std::int64_t k : window.views)
     out.geometry.theta_rad.push_back(prepared.geometry.theta_rad[at(k)]);
   out.data = SampleArray(std::vector<float>(at(out.size())));
@@ -219,7 +244,7 @@ LineIntegralNoise passed_noise(const LineIntegralNoise& noise, std::int64_t rows
   parallel_for(views, {}, "", [&](std::int64_t k) {
     // Noise that is left in the prepared view would be taken for slopes.
     const View still = gaussian_filtered(unbinned(prepared, window, k), 1, 1);
-    NoisyPair noisy = with_noise(still, variance, window.first_row * p.binning * columns, columns, k);
+    NoisyPair noisy = with_noise(still, variance, window.first_row * p.binning, {rows, columns}, k);
     white[at(k)] = binned(noisy.difference, p.binning);
     for (auto [view, scan] : {std::pair(&noisy.one, &one), std::pair(&noisy.other, &other)}) {
       steps.apply(*view);
@@ -238,7 +263,8 @@ LineIntegralNoise passed_noise(const LineIntegralNoise& noise, std::int64_t rows
   });
   Powers sum;
   for (const Powers& powers : of_view) sum.add(powers);
-  LineIntegralNoise out = binned(noise, rows, columns, p.binning);
+  LineIntegralNoise out = fitted(binned(noise, rows, columns, p.binning),
+                                 {rows / p.binning, columns / p.binning}, prepared.geometry);
   for (const double power : sum.of) out.spectrum.push_back(static_cast<float>(power / sum.white));
   const double own = sum.lag[0] / static_cast<double>(sum.pairs[0]);
   for (std::size_t l = 1; l < sum.lag.size() && sum.pairs[l] > 0 && own > 0; ++l)

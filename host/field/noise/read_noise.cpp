@@ -3,8 +3,10 @@
 
 #include "host/field/noise/field_variance.hpp"
 #include "host/field/noise/passed_noise.hpp"
+#include "host/scan/prepare/upright_rows.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/extend_rows.hpp"
+#include "vdvr/expert/field_options.hpp"
 #include "vdvr/expert/noise.hpp"
 #include "vdvr/expert/preparation.hpp"
 
@@ -14,10 +16,27 @@ namespace {
 // As the files have it, but for the centre, which says nothing of the noise: it need not be found.
 ScanOptions as_measured(ScanOptions how, const ProjectionSet& scan) {
   if (!scan.cone || how.center)
-    how.center = unbinned_center(how.center.value_or(scan.geometry.center), how.preparation.binning);
+    how.center =
+        unbinned_center(how.center.value_or(stated_center({}, scan.geometry)), how.preparation.binning);
   how.preparation = {};
   how.preparation.half_acquisition = false;
   return how;
+}
+
+// Of each sample of upright rows that of the pixel it lies in: S leaves white noise as it is, near enough
+// (docs/noise.md).
+LineIntegralNoise on_upright_rows(LineIntegralNoise noise, const ParallelGeometry& g) {
+  const std::int64_t measured_columns = g.columns + 2 * g.extension.cut;
+  for (std::vector<float>* values : {&noise.photon, &noise.read}) {
+    const std::int64_t measured_rows = std::ssize(*values) / measured_columns;
+    if (measured_rows <= g.rows) continue;
+    std::vector<float> upright;
+    for (std::int64_t row = 0; row < g.rows; ++row)
+      for (std::int64_t column = 0; column < g.columns; ++column)
+        upright.push_back((*values)[at(nearest_pixel(g, measured_rows, measured_columns, row, column))]);
+    *values = std::move(upright);
+  }
+  return noise;
 }
 
 // Of flats, pixel by pixel, at the heights that all views see: of the measured row that lies there where the
@@ -26,6 +45,7 @@ std::optional<LineIntegralNoise> noise_of_flats(const std::filesystem::path& pat
                                                 const ParallelGeometry& g) {
   std::optional<LineIntegralNoise> noise = read_line_noise(path, how);
   if (!noise || !g.extension.common_heights) return noise;
+  if (g.axis_roll_deg != 0) return on_upright_rows(std::move(*noise), own_detector(g));
   const std::int64_t columns = own_detector(g).columns;
   for (std::vector<float>* values : {&noise->photon, &noise->read}) {
     const std::int64_t rows = std::ssize(*values) / columns;

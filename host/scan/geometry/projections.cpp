@@ -1,6 +1,8 @@
 // What a cone-beam scan has in common with a parallel one.
 #include "vdvr/expert/projections.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <numbers>
 
@@ -18,6 +20,12 @@ double mean(const std::vector<ConeView>& views, double ConeView::*value) {
 }
 
 }  // namespace
+
+void require_axis_roll(double degrees, const std::string& source) {
+  if (!(std::abs(degrees) <= most_axis_roll_deg))
+    throw InputError(fmt::format("{}: a roll of {} degrees; it must be a number from -{} to {}", source,
+                                 degrees, most_axis_roll_deg, most_axis_roll_deg));
+}
 
 ParallelGeometry parallel_limit(const ConeGeometry& cone, std::int64_t columns, std::int64_t rows,
                                 const std::string& unit) {

@@ -148,6 +148,8 @@ void shifts_by_option(const ScanOptions& options, RawScan& raw) {
 RawScan open_scan(const fs::path& path, const ScanOptions& options, bool& folder) {
   RawScan raw = open_files(path, options, folder);
   if (!options.shifts.empty()) shifts_by_option(options, raw);
+  if (options.input.axis_roll_deg)
+    state_axis_roll(raw, *options.input.axis_roll_deg, path.string() + ": `axis_roll`");
   if (!options.input.views.empty()) select_views(raw, options.input.views);
   const std::set<std::string> names(raw.view_files.begin(), raw.view_files.end());
   for (const std::string& name : names) raw.files.emplace_back(name, raw.folder / name);

@@ -29,7 +29,7 @@ std::set<std::string> known_members() {
       "projections", "hdf5",         "flats", "darks", "angles",      "angle_range",
       "use",         "center",       "pitch", "unit",  "air_columns", "description",
       "comment",     "redundancy",   "beam",  "entry", "angle_unit",  "half_acquisition",
-      "flats_at",    "beam_current", "shifts"};
+      "flats_at",    "beam_current", "shifts", "axis_roll"};
   known.insert(cone_kinds.begin(), cone_kinds.end());
   return known;
 }
@@ -289,6 +289,12 @@ void set_shifts(const Description& about, RawScan& scan) {
                source);
 }
 
+void set_axis_roll(const Description& about, RawScan& scan) {
+  if (about.has("axis_roll"))
+    state_axis_roll(scan, about.number("axis_roll"),
+                    (about.folder() / "scan.json").string() + ": 'axis_roll'");
+}
+
 void set_angles(const Description& about, RawScan& scan) {
   if (about.has("redundancy")) about.fail("'redundancy' goes with cone-beam geometry");
   if (about.has("angles")) scan.theta_deg = listed_angles(about, scan);
@@ -348,6 +354,7 @@ RawScan open_scan_folder(const fs::path& folder, const ScanOptions& options) {
   else if (const auto kind = cone_kind(about)) set_cone(about, *kind, scan);
   else set_angles(about, scan);
   set_shifts(about, scan);
+  set_axis_roll(about, scan);
   // Views that options choose are chosen among all.
   if (about.has("use") && options.input.views.empty()) use_views(about, scan);
   return scan;

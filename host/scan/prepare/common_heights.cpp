@@ -10,6 +10,7 @@
 #include "host/base/system/casts.hpp"
 #include "host/base/system/limits.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/scan/prepare/upright_rows.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/scratch.hpp"
 
@@ -48,7 +49,9 @@ void common_heights(ProjectionSet& scan, const Preparation& wanted, std::uint64_
                     const std::filesystem::path& scratch) {
   ParallelGeometry& g = scan.geometry;
   scan.report.preparation.common_heights = {};
-  if (g.row_shift.empty() || !wanted.common_heights.value_or(true)) return;
+  if (!wanted.common_heights.value_or(true)) return;
+  if (g.axis_roll_deg != 0) return upright_rows(scan, max_memory_bytes, scratch);
+  if (g.row_shift.empty()) return;
   const auto [least, most] = std::minmax_element(g.row_shift.begin(), g.row_shift.end());
   const double range = *most - *least, middle = 0.5 * (*least + *most);
   const auto common = static_cast<std::int64_t>(std::floor(static_cast<double>(g.rows) - range + hit));

@@ -19,9 +19,10 @@
 
 namespace vdvr {
 
-/// In place, and recorded in geometry and report. Does nothing where no rows are shifted, or where `wanted`
-/// says that heights are left as seen. Throws InputError where views share no height, ResourceError as
-/// read_scan. Cost: views * columns * rows^2 multiply-adds.
+/// In place, and recorded in geometry and report; by upright_rows() where the axis leans. Does nothing where
+/// no rows are shifted and it does not, or where `wanted` says that heights are left as seen. Throws
+/// InputError where views share no height, ResourceError as read_scan. Cost: views * columns * rows^2
+/// multiply-adds.
 void common_heights(ProjectionSet& scan, const Preparation& wanted, std::uint64_t max_memory_bytes,
                     const std::filesystem::path& scratch);
 

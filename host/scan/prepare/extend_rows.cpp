@@ -44,19 +44,25 @@ double arc_of(const ParallelGeometry& g) {
   return *high - *low;
 }
 
+// The axis as messages count it: in the detector's columns, some of which a leaning axis leaves out.
+double detector_column(const ParallelGeometry& own) {
+  return own.center + static_cast<double>(own.extension.cut);
+}
+std::int64_t detector_columns(const ParallelGeometry& own) { return own.columns + 2 * own.extension.cut; }
+
 void require_half_acquisition(const ParallelGeometry& own) {
   const Sides sides(own);
   if (!(sides.near > 0))
     throw InputError(fmt::format(
         "half acquisition: the axis, column {:.2f}, lies off the detector's {} columns, so that no "
         "view sees what is around it; correct `center`",
-        own.center, own.columns));
+        detector_column(own), detector_columns(own)));
   if (sides.near < least_half_overlap)
     throw InputError(fmt::format(
         "half acquisition: opposite views overlap by {:.1f} columns (the axis is at column {:.2f} of {}), "
         "and "
         "{:.0f} are needed to go over from one to the other; correct `center`, or measure with more overlap",
-        2 * sides.near, own.center, own.columns, 2 * least_half_overlap));
+        2 * sides.near, detector_column(own), detector_columns(own), 2 * least_half_overlap));
   const AngularGaps gaps = angular_gaps(own.theta_rad, 2 * std::numbers::pi);
   const std::vector<double> wedges = gaps.wedges_rad();
   if (gaps.one_direction || !wedges.empty())
@@ -72,6 +78,7 @@ void require_half_acquisition(const ParallelGeometry& own) {
 RowExtension extension_of(const ParallelGeometry& own, bool half, Padding padding) {
   RowExtension e;
   e.common_heights = own.extension.common_heights;
+  e.cut = own.extension.cut;
   e.padding = padding;
   e.center = own.center;
   const Sides sides(own);
@@ -175,7 +182,7 @@ std::string words_of(const ParallelGeometry& own) {
       "{:.0f} columns, weights go over from one to the other, and a circle of {:.1f} columns around the axis "
       "is "
       "covered",
-      own.center, own.columns, 2 * sides.near, 2 * sides.far);
+      detector_column(own), detector_columns(own), 2 * sides.near, 2 * sides.far);
 }
 
 }  // namespace
@@ -235,6 +242,7 @@ ParallelGeometry own_detector(const ParallelGeometry& g) {
   }
   own.extension = {};
   own.extension.common_heights = e.common_heights;
+  own.extension.cut = e.cut;
   return own;
 }
 

@@ -86,6 +86,8 @@ RawScan open_data_exchange(const Reader& file, const std::string& group, const H
                                   list.name, count_of(list), data.count));
     state_shifts(scan, list.read_all(), list.name);
   }
+  if (const auto roll = file.find_real(object, "axis_roll"))
+    state_axis_roll(scan, *roll, fmt::format("{}: {}, axis_roll", file.path(), object));
   return scan;
 }
 

@@ -107,6 +107,7 @@ std::string text_of(const InputStatement& s) {
   if (s.values) add(text_of(*s.values));
   if (s.angle_unit) add(fmt::format("angles in {}", text_of(*s.angle_unit)));
   if (!s.beam_current.empty()) add("beam current " + s.beam_current);
+  if (s.axis_roll_deg) add(fmt::format("axis roll {}", *s.axis_roll_deg));
   return text.empty() ? "none" : text;
 }
 

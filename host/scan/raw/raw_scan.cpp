@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "vdvr/error.hpp"
+#include "vdvr/expert/projections.hpp"
 
 namespace vdvr::io {
 
@@ -65,6 +66,16 @@ void state_shifts(RawScan& scan, const std::vector<double>& numbers, const std::
     if (width == 2) scan.shift_v.push_back(numbers[i + 1]);
   }
   scan.shifts_source = source;
+}
+
+void state_axis_roll(RawScan& scan, double degrees, const std::string& source) {
+  if (scan.cone)
+    throw FileError(source +
+                    ": an axis' roll is of parallel beam; geometries of cone beam have tilts of their own "
+                    "('tilt' of 'geometry', 'matrices')");
+  require_axis_roll(degrees, source);
+  scan.axis_roll_deg = degrees;
+  scan.axis_roll_source = source;
 }
 
 void select_views(RawScan& scan, const ViewRanges& wanted) {

@@ -73,6 +73,8 @@ struct RawScan {
   std::vector<SamplePositions> positions;
   std::vector<double> shift_u, shift_v;  ///< by view, in `unit`, where options or scan.json state them
   std::string shifts_source;             ///< who does; not empty: positions do not count
+  double axis_roll_deg = 0;
+  std::string axis_roll_source;  ///< who states it; empty: nobody
   std::vector<std::pair<std::int64_t, std::int64_t>> air_columns;  ///< inclusive
   std::vector<std::pair<std::string, std::filesystem::path>>
       files;                            ///< name in the hash, path; every file read
@@ -98,6 +100,10 @@ void place_flats(RawScan& scan, const std::vector<double>& projections_before, c
 /// FileError, which begins with `source`, for another count of numbers or one that is not finite, and for
 /// cone beam.
 void state_shifts(RawScan& scan, const std::vector<double>& numbers, const std::string& source);
+
+/// The axis' roll that somebody states. Throws FileError, which begins with `source`, for one that is not
+/// within most_axis_roll_deg, and for cone beam.
+void state_axis_roll(RawScan& scan, double degrees, const std::string& source);
 
 /// Keeps the views of these ranges and their geometry. Throws InputError as checked_ranges.
 void select_views(RawScan& scan, const ViewRanges& ranges);

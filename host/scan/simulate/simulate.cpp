@@ -59,6 +59,12 @@ void check(const Phantom& phantom, const SimulateOptions& o) {
   for (const auto& shift : o.shifts)
     for (const double s : shift)
       if (!std::isfinite(s)) refuse("shift", s, "a finite length");
+  require_axis_roll(o.axis_roll_deg, "simulate");
+  if (o.axis_roll_deg != 0 && o.cone)
+    throw InputError("simulate: an axis' roll is of parallel beam; a cone has its own tilts");
+  if (o.axis_roll_deg != 0 && !phantom.line_integral)
+    throw InputError(fmt::format(
+        "simulate: phantom \"{}\" has no line integrals of single rays, which a roll needs", phantom.name));
   if (!not_negative(o.noise_sigma))
     refuse("noise-sigma", o.noise_sigma, "0 or a fraction of the largest line integral");
   if (o.median < 0 || (o.median > 0 && o.median % 2 == 0))
@@ -94,7 +100,7 @@ FineDetector fine_detector(const SimulateOptions& o) {
     return x;
   };
   d.u = positions(d.columns * rate, d.pitch_u / static_cast<double>(rate),
-                  o.cone ? 0.0 : o.detector_offset * o.pitch_u);
+                  o.cone || o.axis_roll_deg != 0 ? 0.0 : o.detector_offset * o.pitch_u);
   d.v = positions(d.rows, d.pitch_v, 0);
   return d;
 }
@@ -253,13 +259,25 @@ class Simulator {
         for (double& u : us) u -= du;
         for (double& height : vs) height -= dv;
       }
-      if (phantom_.view_integrals) phantom_.view_integrals(theta, us, vs, out);
+      if (options_.axis_roll_deg != 0) integrate_leaning(theta, us, vs, out);
+      else if (phantom_.view_integrals) phantom_.view_integrals(theta, us, vs, out);
       else
         for (std::size_t j = 0; j < v.size(); ++j)
           for (std::size_t i = 0; i < n; ++i) out[j * n + i] = phantom_.line_integral(theta, us[i], vs[j]);
     }
     for (std::size_t j = 0; j < v.size(); ++j)
       if (out[j * n] != 0 || out[j * n + n - 1] != 0) truncated_[static_cast<std::size_t>(k)] = 1;
+  }
+
+  // Rays at distances t from the axis and heights z along it, of pixels that lie turned against both.
+  void integrate_leaning(double theta, const std::vector<double>& us, const std::vector<double>& vs,
+                         std::span<double> out) const {
+    const double roll = options_.axis_roll_deg * (std::numbers::pi / 180), c = std::cos(roll),
+                 s = std::sin(roll), offset = options_.detector_offset * options_.pitch_u;
+    for (std::size_t j = 0; j < vs.size(); ++j)
+      for (std::size_t i = 0; i < us.size(); ++i)
+        out[j * us.size() + i] =
+            phantom_.line_integral(theta, us[i] * c - vs[j] * s + offset, us[i] * s + vs[j] * c);
   }
 
   [[nodiscard]] View detected(View view, double noise, std::int64_t k) const {
@@ -296,6 +314,7 @@ std::string options_text(const Phantom& phantom, const SimulateOptions& o) {
                       {"binning", o.binning}};
   if (o.detector_offset != 0) text["detector_offset"] = o.detector_offset;
   if (!o.shifts.empty()) text["shifts"] = o.shifts;
+  if (o.axis_roll_deg != 0) text["axis_roll_deg"] = o.axis_roll_deg;
   if (o.cone)
     text["cone"] = {{"source_to_axis", o.cone->source_to_axis},
                     {"source_to_detector", o.cone->source_to_detector},
@@ -356,6 +375,7 @@ ProjectionSet simulate(const Phantom& phantom, const SimulateOptions& options, c
     }
     for (std::vector<double>* shift : {&scan.geometry.column_shift, &scan.geometry.row_shift})
       if (std::all_of(shift->begin(), shift->end(), [](double s) { return s == 0; })) shift->clear();
+    scan.geometry.axis_roll_deg = options.axis_roll_deg;
     if (options.cone) {
       scan.cone = cone_geometry_of(options);
       scan.geometry = parallel_limit(*scan.cone, options.columns, options.rows, options.unit);

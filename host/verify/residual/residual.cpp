@@ -77,7 +77,7 @@ Residual residual(const ProjectionSet& scan, const MixedVolume& volume, const Ce
   ParallelGeometry longer = scan.geometry;
   longer.center = center_of(certificate.field, longer);
   out.geometry = own_detector(longer);
-  out.geometry.center = stated_center(certificate.field, longer);
+  out.geometry.center = stated_center(certificate.field, longer) - static_cast<double>(longer.extension.cut);
   std::tie(out.first_row, out.rows) = wanted_rows(scan.geometry, options);
   const ParallelGeometry& g = out.geometry;
   const std::vector<float> bounds = brick_bounds(certificate, false);

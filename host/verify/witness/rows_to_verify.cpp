@@ -12,6 +12,7 @@
 
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/verify/witness/upright_to_verify.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -139,10 +140,13 @@ ProjectionSet rows_to_verify(ProjectionSet measured, const FieldOptions& field) 
   if (g.extension.before > 0 || g.extension.after > 0)
     throw InputError("rows_to_verify: the scan's rows are longer than the detector already");
   const bool heights = field.preparation.common_heights.value_or(false);
-  if (heights == g.row_shift.empty() || g.extension.common_heights)
+  const bool as_seen = g.row_shift.empty() && g.axis_roll_deg == 0;
+  if (heights == as_seen || g.extension.common_heights)
     throw InputError(
-        "rows_to_verify: heights are not as the certificate says: give the scan's own rows and shifts");
-  if (heights) to_common_heights(measured);
+        "rows_to_verify: heights are not as the certificate says: give the scan's own rows, shifts and roll of "
+        "the axis");
+  if (heights && g.axis_roll_deg != 0) to_upright_rows(measured);
+  else if (heights) to_common_heights(measured);
   measured.report.preparation.common_heights = field.preparation.common_heights;
   measured.report.preparation.half_acquisition = field.preparation.half_acquisition;
   measured.report.preparation.padding = padding;
@@ -150,7 +154,8 @@ ProjectionSet rows_to_verify(ProjectionSet measured, const FieldOptions& field) 
   if (!half && padding == Padding::none) return measured;
   if (measured.cone)
     throw InputError("rows_to_verify: rows of parallel beam are made longer, not of cone beam");
-  if (field.center) g.center = *field.center;
+  const std::int64_t cut = g.extension.cut;
+  if (field.center) g.center = *field.center - static_cast<double>(cut);
   if (!(g.center > -0.5 && g.center < static_cast<double>(g.columns) - 0.5))
     throw InputError(fmt::format("centre {}: off the {} columns", g.center, g.columns));
   const LongerRow row = longer_row(g, half, padding);
@@ -164,7 +169,7 @@ ProjectionSet rows_to_verify(ProjectionSet measured, const FieldOptions& field) 
     }
   });
   measured.data = std::move(longer);
-  g.extension = {field.preparation.half_acquisition, padding, row.before, row.after, g.center, heights};
+  g.extension = {field.preparation.half_acquisition, padding, row.before, row.after, g.center, heights, cut};
   g.columns = wide;
   g.center += static_cast<double>(row.before);
   return measured;

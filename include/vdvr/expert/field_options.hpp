@@ -46,14 +46,16 @@ struct FieldOptions {
 /// The centre that defines F, the field's, else the scan's: a column of the detector's own.
 inline double stated_center(const FieldOptions& field, const ParallelGeometry& g) {
   const bool longer = g.extension.before > 0 || g.extension.after > 0;
-  return field.center.value_or(longer ? g.extension.center : g.center);
+  return field.center.value_or((longer ? g.extension.center : g.center) +
+                               static_cast<double>(g.extension.cut));
 }
 
-/// The same as a column of the scan's rows, which may have been made longer. Throws InputError where rows of
+/// The same as a column of the scan's rows, which may have been made longer, or cut where they were brought
+/// upright. Throws InputError where rows of
 /// half acquisition were weighted about another centre.
 inline double center_of(const FieldOptions& field, const ParallelGeometry& g) {
   if (!field.center) return g.center;
-  const double center = *field.center + static_cast<double>(g.extension.before);
+  const double center = *field.center + static_cast<double>(g.extension.before - g.extension.cut);
   if (g.extension.half_acquisition.value_or(false) && center != g.center)
     throw InputError(
         "half acquisition: the rows were weighted about another centre; read the scan with this one");

@@ -46,6 +46,8 @@ struct InputStatement {
   std::optional<AngleUnit> angle_unit;  ///< whatever the file of the angles says
   /// Of an HDF5 file: the dataset of the beam's current in each frame, or "none"; empty: the usual one.
   std::string beam_current{};
+  /// Of the axis of parallel beam, in the detector's plane (ParallelGeometry), whatever the files say.
+  std::optional<double> axis_roll_deg{};
 
   [[nodiscard]] bool none() const { return *this == InputStatement{}; }
   bool operator==(const InputStatement&) const = default;

@@ -17,6 +17,11 @@
 
 namespace vdvr {
 
+/// An axis that leans farther, against the detector's columns, is a detector that was put in another way.
+inline constexpr double most_axis_roll_deg = 10;
+/// Throws InputError, which begins with `source`, for a roll beyond it or one that is no number.
+VDVR_API void require_axis_roll(double degrees, const std::string& source);
+
 /// What rows have beyond the detector's own columns (extend_rows.hpp), and how their samples were weighted.
 struct RowExtension {
   /// True: rows are weighted as those of half acquisition; false: it was stated that they are none.
@@ -24,7 +29,9 @@ struct RowExtension {
   Padding padding = Padding::none;
   std::int64_t before = 0, after = 0;  ///< columns added on either side
   double center = 0;                   ///< column of the axis among the detector's own, where any were added
-  bool common_heights = false;         ///< views that saw other heights were brought to those that all see
+  /// Views that saw other heights were brought to those that all see, and those of a leaning axis upright.
+  bool common_heights = false;
+  std::int64_t cut = 0;  ///< columns left out on either side, where rows were brought upright
   bool operator==(const RowExtension&) const = default;
 };
 
@@ -36,13 +43,16 @@ struct ParallelGeometry {
   double center = 0.0;       ///< column onto which the rotation axis projects; (U - 1)/2 in a centred scan
   std::string unit = "pixel";
   std::vector<double> theta_rad;  ///< one angle per view
-  RowExtension extension{};       ///< `columns` and `center` count the columns that it added
+  RowExtension extension{};       ///< `columns` and `center` count the columns that it added or left out
   /// By view how far the sample stood towards higher columns, in columns: view k sees the axis at column
   /// center + column_shift[k]. Empty: it only turned.
   std::vector<double> column_shift{};
   /// The same towards higher rows, in rows, of rows as they were measured. `rows` are those of common heights
   /// where `extension` says so; F is made of such rows alone.
   std::vector<double> row_shift{};
+  /// Of the axis against the detector's columns, in its plane: at higher rows a positive roll has the axis at
+  /// higher columns. Where `extension` says that rows are upright, everything else here is of these rows.
+  double axis_roll_deg = 0;
 
   [[nodiscard]] double center_of_view(std::size_t k) const {
     return column_shift.empty() ? center : center + column_shift[k];

@@ -25,6 +25,7 @@ struct ArrayScan {
   Padding padding = Padding::none;
   /// By view how far the sample stood towards higher columns and rows, in `unit`; empty: it only turned.
   std::vector<std::array<double, 2>> shifts{};
+  double axis_roll_deg = 0;  ///< of the axis in the detector's plane; ParallelGeometry says which way
   double pitch_u = 1, pitch_v = 1;
   std::string unit = "pixel";
   std::string name = "array";  ///< what the certificate calls the input

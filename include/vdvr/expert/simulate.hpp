@@ -104,6 +104,9 @@ struct SimulateOptions {
   /// Of parallel beam, by view how far the sample stands towards higher columns and rows, in `unit`; empty:
   /// it only turns.
   std::vector<std::array<double, 2>> shifts{};
+  /// Of parallel beam: the axis' roll in the detector's plane, as ParallelGeometry has it. The detector's
+  /// middle is where its columns are counted from, `detector_offset` columns beside the axis, across it.
+  double axis_roll_deg = 0;
   std::optional<ConeSetup> cone;  ///< pitches are then those on the detector
 
   int binning = 1;  ///< fine pixels per detector pixel, both ways; their mean is the pixel
