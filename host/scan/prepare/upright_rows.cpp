@@ -186,7 +186,7 @@ void upright_rows(ProjectionSet& scan, std::uint64_t max_memory_bytes, const std
   const Turned t = turned(g);
   const std::int64_t columns = g.columns - 2 * t.cut;
   const auto size = static_cast<std::uint64_t>(g.views() * t.rows * columns);
-  auto room = scratch_for(size * sizeof(float), max_memory_bytes, scratch);
+  auto room = scratch_for_scan(g.views(), t.rows, columns, max_memory_bytes, scratch);
   io::require_memory(scan.data.resident_bytes() + (room ? max_memory_bytes / 8 : size * sizeof(float)),
                      max_memory_bytes, fmt::format("{} rows of {} columns, upright", t.rows, columns));
   SampleArray out(size, std::move(room), "the projections on upright rows");
