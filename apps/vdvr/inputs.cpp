@@ -45,9 +45,10 @@ void add_scan(Arguments& args) {
              "how far the sample stood in each view towards higher columns [and rows], in the unit of the "
              "pitch: "
              "numbers, or FILE.h5:/dataset; none: it stood still")
-      .value("axis-roll", "DEG",
-             "how far the axis of rotation leans in the detector's plane, in degrees, towards higher columns at "
-             "higher rows (parallel beam)")
+      .value(
+          "axis-roll", "DEG",
+          "how far the axis of rotation leans in the detector's plane, in degrees, towards higher columns at "
+          "higher rows (parallel beam)")
       .value("beam", "cone|parallel",
              "cone: by the distances of an NXtomo file, which is read as parallel beam otherwise")
       .value("entry", "NAME", "the group of an HDF5 file that holds the scan, where there are several")

@@ -105,7 +105,8 @@ BOOST_AUTO_TEST_CASE(the_object_comes_out_as_if_the_axis_stood_upright) {
       ProjectionSet other = own;
       other.geometry.axis_roll_deg = share * roll;
       const double wrong = off_by(upright(other));
-      // A point 12 from the axis and 4 high lies off by 12 times the roll, where densities change by .03 a pixel and more.
+      // A point 12 from the axis and 4 high lies off by 12 times the roll, where densities change by .03 a
+      // pixel and more.
       BOOST_TEST(wrong > right + 0.03 * 12 * (1 - share) * std::abs(roll) * std::numbers::pi / 180);
     }
   }

@@ -301,8 +301,8 @@ inline void draw_shifts(std::uint64_t seed, ParallelGeometry& g, std::string& na
       std::string(", shifted") + (along_columns ? " along columns" : "") + (along_rows ? " along rows" : "");
 }
 
-/// One case in five of those with rows to spare is of an axis that leans, by as much as leaves a row. Drawn apart, so
-/// that other cases stay as they are.
+/// One case in five of those with rows to spare is of an axis that leans, by as much as leaves a row. Drawn
+/// apart, so that other cases stay as they are.
 inline void draw_roll(std::uint64_t seed, ProjectionSet& scan, std::string& name) {
   Random random(seed * 0x8ebc6af09c88c6e3u + 13);
   ParallelGeometry& g = scan.geometry;

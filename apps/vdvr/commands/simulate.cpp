@@ -35,9 +35,10 @@ void add_options(Arguments& args) {
              "how far the object stands in each view towards higher columns [and rows], in world units "
              "(parallel "
              "beam)")
-      .value("axis-roll", "DEG",
-             "how far the axis leans in the detector's plane, towards higher columns at higher rows (parallel "
-             "beam; default 0)")
+      .value(
+          "axis-roll", "DEG",
+          "how far the axis leans in the detector's plane, towards higher columns at higher rows (parallel "
+          "beam; default 0)")
       .flag("point", "line integrals at the pixel centres")
       .flag("band-limited", "ideal low-pass at the detector's Nyquist frequency (default)")
       .value("noise-sigma", "S", "Gaussian noise, as a fraction of the largest line integral")

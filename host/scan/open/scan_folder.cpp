@@ -26,9 +26,9 @@ namespace fs = std::filesystem;
 
 std::set<std::string> known_members() {
   std::set<std::string> known{
-      "projections", "hdf5",         "flats", "darks", "angles",      "angle_range",
-      "use",         "center",       "pitch", "unit",  "air_columns", "description",
-      "comment",     "redundancy",   "beam",  "entry", "angle_unit",  "half_acquisition",
+      "projections", "hdf5",         "flats",  "darks",    "angles",      "angle_range",
+      "use",         "center",       "pitch",  "unit",     "air_columns", "description",
+      "comment",     "redundancy",   "beam",   "entry",    "angle_unit",  "half_acquisition",
       "flats_at",    "beam_current", "shifts", "axis_roll"};
   known.insert(cone_kinds.begin(), cone_kinds.end());
   return known;

@@ -74,7 +74,7 @@ struct RawScan {
   std::vector<double> shift_u, shift_v;  ///< by view, in `unit`, where options or scan.json state them
   std::string shifts_source;             ///< who does; not empty: positions do not count
   double axis_roll_deg = 0;
-  std::string axis_roll_source;  ///< who states it; empty: nobody
+  std::string axis_roll_source;                                    ///< who states it; empty: nobody
   std::vector<std::pair<std::int64_t, std::int64_t>> air_columns;  ///< inclusive
   std::vector<std::pair<std::string, std::filesystem::path>>
       files;                            ///< name in the hash, path; every file read

@@ -143,7 +143,8 @@ ProjectionSet rows_to_verify(ProjectionSet measured, const FieldOptions& field) 
   const bool as_seen = g.row_shift.empty() && g.axis_roll_deg == 0;
   if (heights == as_seen || g.extension.common_heights)
     throw InputError(
-        "rows_to_verify: heights are not as the certificate says: give the scan's own rows, shifts and roll of "
+        "rows_to_verify: heights are not as the certificate says: give the scan's own rows, shifts and roll "
+        "of "
         "the axis");
   if (heights && g.axis_roll_deg != 0) to_upright_rows(measured);
   else if (heights) to_common_heights(measured);
