@@ -132,7 +132,7 @@ double KeptGold::room_to_sources(double from, const std::pair<double, double>& h
 ConeLattice KeptGold::cone_lattice(double reach) const {
   constexpr double cells_around = 4;
   const double around =
-      cells_around * grid_.spacing[2] + 2 * static_cast<double>(half_taps_[2]) * spacing_[2];
+      cells_around * grid_.spacing[2] + (static_cast<double>(half_taps_[2]) + 1) * spacing_[2];
   const auto node = [&](double z) { return (z - grid_.origin[2]) / spacing_[2]; };
   const auto margin = static_cast<double>(2 * run_margin);
   const double low = std::clamp(node(coverage_.heights().first - around), -margin, 1e9),
