@@ -22,6 +22,11 @@ constexpr double sampled_bricks = 480, fewest_of_stratum = 12;
 // kept nodes around a block.
 constexpr double fewest_columns = 4, most_back_projected = 3e9, kept_around = 40;
 
+// Middle columns: cells that a column of bricks is wide, and cells around what is looked at in
+// which nodes are kept. Filters read seven at most, of the other five samples are fitted.
+constexpr std::int64_t sampled_cells = 16;
+constexpr double cells_around = 12;
+
 // The larger signed sum of the second differences of base samples in each brick, an eighth of it: what
 // trilinear interpolation of them may err by, if they resolved the field. They need not: it only sorts
 // bricks.
@@ -60,6 +65,9 @@ int stratum_of(double error, double tolerance) {
       std::clamp(std::round(2 * std::log2(std::max(error / tolerance, 1e-9))), -8.0, 16.0));
 }
 
+// Tiles grow with the error to the power 3/2, and so does their spread.
+double weight_of_stratum(int key) { return std::pow(2.0, 0.75 * key); }
+
 // What becomes of a brick: level 0 by coarse gold, by fine or by finer, a tile from coarse gold (measured on
 // it or on fine gold) or from fine.
 enum Fate { coarse_stays, fine_stays, finer_stays, coarse_refined, proposed, fine_refined, fates };
@@ -94,7 +102,7 @@ std::vector<std::uint8_t> some_blocks(const GoldStream& stream, const Index3& n,
     for (std::int64_t z = z0; z < std::min(n[2], z0 + block[2]); ++z)
       for (std::int64_t y = y0; y < std::min(n[1], y0 + block[1]); ++y)
         for (std::int64_t x = x0; x < std::min(n[0], x0 + block[0]); ++x)
-          selected[at((z * n[1] + y) * n[0] + x)] = 1;
+          selected[at((z * n[1] + y) * n[0] + x)] = looked_at[at((z * n[1] + y) * n[0] + x)];
   }
   return selected;
 }
@@ -132,8 +140,8 @@ class Paces {
 // The strata of the bricks, and which of them to look at.
 std::map<int, Stratum> strata_of(const std::vector<std::uint8_t>& near,
                                  const std::vector<std::uint8_t>& looked_at, const std::vector<double>& error,
-                                 const NodeTolerance& tolerance, const Index3& n) {
-  const std::int64_t some = std::min(layers, n[2]);
+                                 const NodeTolerance& tolerance, const Index3& n, bool all_layers) {
+  const std::int64_t some = all_layers ? n[2] : std::min(layers, n[2]);
   std::vector<std::uint8_t> in_layer(at(n[2]), 0);
   for (std::int64_t i = 0; i < some; ++i) in_layer[at((2 * i + 1) * n[2] / (2 * some))] = 1;
   std::map<int, Stratum> strata;
@@ -145,9 +153,9 @@ std::map<int, Stratum> strata_of(const std::vector<std::uint8_t>& near,
       s.candidates.push_back(static_cast<std::int64_t>(i));
   }
   const auto excess = [&](std::int64_t i) { return error[at(i)] / tolerance.of(at(i)); };
-  // Tiles grow with the error to the power 3/2, and so does their spread: sample in that proportion (Neyman).
+  // Sampled in proportion to their spread (Neyman).
   const auto weight = [](int key, const Stratum& s) {
-    return static_cast<double>(s.bricks.size()) * std::pow(2.0, 0.75 * key);
+    return static_cast<double>(s.bricks.size()) * weight_of_stratum(key);
   };
   double all_weights = 0;
   for (const auto& [key, s] : strata) all_weights += weight(key, s);
@@ -207,13 +215,71 @@ std::vector<std::uint8_t> bricks_to_look_at(GoldStream& stream, const ParallelGe
   return bricks_of_columns(std::move(near), chosen);
 }
 
-std::vector<std::uint8_t> bricks_on_radius(GoldStream& stream) {
-  const GoldSettings& settings = stream.settings();
-  const Index3 n = Bricks(settings.grid, settings.granularity).along(), block = stream.block_bricks();
-  std::vector<std::uint8_t> chosen(at(n[0] * n[1]), 0);
-  for (std::int64_t x = n[0] / 2; x < n[0]; ++x)
-    choose_column(chosen, n, block, {(static_cast<double>(x) + 0.5) / static_cast<double>(n[0]), 0.5});
-  return bricks_of_columns(stream.bricks_near_coverage(), chosen);
+SampledColumns::SampledColumns(const Volume& base, const std::vector<std::uint8_t>& near, int granularity,
+                               double tolerance)
+    : grid_(base.grid), granularity_(granularity) {
+  const Index3 n = Bricks(grid_, granularity).along();
+  const std::vector<double> error = expected_error(base, granularity, n);
+  // By column, how many bricks there are of every stratum.
+  std::vector<std::map<int, double>> columns(at(n[0] * n[1]));
+  for (std::size_t i = 0; i < error.size(); ++i)
+    if (near[i]) columns[i % columns.size()][stratum_of(error[i], tolerance)] += 1;
+  const auto add = [](std::map<int, double>& to, const std::map<int, double>& more) {
+    for (const auto& [key, bricks] : more) to[key] += bricks;
+  };
+  const auto size = [](const std::map<int, double>& strata) {
+    double sum = 0;
+    for (const auto& [key, bricks] : strata) sum += bricks;
+    return std::max(1.0, sum);
+  };
+  std::map<int, double> all;
+  for (const auto& column : columns) add(all, column);
+  const std::int64_t width = std::min(n[1], std::max<std::int64_t>(1, sampled_cells / granularity)),
+                     length = (n[0] + 1) / 2;
+  double least = HUGE_VAL;
+  for (std::int64_t y = 0; y + width <= n[1]; ++y)
+    for (std::int64_t x = 0; x + length <= n[0]; ++x) {
+      std::map<int, double> here;
+      for (std::int64_t j = y; j < y + width; ++j)
+        for (std::int64_t i = x; i < x + length; ++i) add(here, columns[at(j * n[0] + i)]);
+      double unlike = 0;
+      for (const auto& [key, bricks] : all)
+        unlike += weight_of_stratum(key) * std::abs(here[key] / size(here) - bricks / size(all));
+      if (!(unlike < least)) continue;
+      least = unlike;
+      first = {x, y};
+      end = {x + length, y + width};
+    }
+}
+
+std::vector<std::uint8_t> SampledColumns::of(std::vector<std::uint8_t> near) const {
+  const Index3 n = Bricks(grid_, granularity_).along();
+  for (std::int64_t i = 0; i < std::ssize(near); ++i) {
+    const std::int64_t x = i % n[0], y = i / n[0] % n[1];
+    if (x < first[0] || x >= end[0] || y < first[1] || y >= end[1]) near[at(i)] = 0;
+  }
+  return near;
+}
+
+bool SampledColumns::is_worth_it() const {
+  double of_part = 1, of_all = 1;
+  for (std::size_t a = 0; a < 2; ++a) {
+    of_part *= static_cast<double>((end[a] - first[a]) * granularity_) + 2 * cells_around;
+    of_all *= static_cast<double>(grid_.cells[a]) + 2 * cells_around;
+  }
+  return of_part < of_all / 3;
+}
+
+PlanePart SampledColumns::part() const {
+  PlanePart out;
+  for (std::size_t a = 0; a < 2; ++a) {
+    const auto place = [&](std::int64_t brick, double more) {
+      return grid_.origin[a] + (static_cast<double>(brick * granularity_) + more) * grid_.spacing[a];
+    };
+    out.low[a] = place(first[a], -cells_around);
+    out.high[a] = place(end[a], cells_around);
+  }
+  return out;
 }
 
 // A brick that was classified to see what becomes of it.
@@ -292,7 +358,8 @@ BuildForecast Forecaster::forecast(NodeTolerance tolerance) {
   const bool screens = gold_.coarse() != nullptr;
   const double first_pass = first_pass_seconds(tolerance);
   // Bricks of every stratum tell what follows it.
-  std::map<int, Stratum> strata = strata_of(near_, looked_at_, error_, tolerance, n);
+  std::map<int, Stratum> strata =
+      strata_of(near_, looked_at_, error_, tolerance, n, settings.part.has_value());
   std::vector<std::uint8_t> sampled(near_.size(), 0);
   for (const auto& [key, s] : strata)
     for (const std::int64_t i : s.candidates) sampled[at(i)] = 1;
@@ -333,14 +400,7 @@ BuildForecast Forecaster::forecast(NodeTolerance tolerance) {
   out.samples_ratio =
       (static_cast<double>(stored_.size()) + static_cast<double>(near_.size()) + tile_samples) / samples;
   out.tile_bytes = static_cast<std::uint64_t>(4 * tile_samples);
-  // What will be kept and was not needed so far.
-  const KeptGold& kept = gold_.fine().source()->kept;
-  const std::int64_t missing = gold_.fine().missing_tiles(near_, GoldStream::For::samples);
-  out.kept_bytes =
-      kept.bytes() / static_cast<std::uint64_t>(std::max<std::int64_t>(1, kept.tiles())) * count(missing);
-  out.kept_seconds = kept.column_seconds() +
-                     kept.tile_seconds() / static_cast<double>(std::max<std::int64_t>(1, kept.tiles())) *
-                         static_cast<double>(kept.tiles() + missing);
+  add_kept(out);
   out.seconds = first_pass + out.kept_seconds;
   const auto add = [&](GoldStream& gold, GoldStream::For purpose, const std::vector<std::uint8_t>& of) {
     out.seconds += small.seconds(gold, purpose, of);
@@ -360,6 +420,19 @@ BuildForecast Forecaster::forecast(NodeTolerance tolerance) {
   }
   add(gold_.fine(), For::measuring, hard);
   return out;
+}
+
+// What will be kept and was not needed so far.
+void Forecaster::add_kept(BuildForecast& out) {
+  KeptGold& kept = gold_.fine().source()->kept;
+  const auto tiles = static_cast<double>(std::max<std::int64_t>(1, kept.tiles()));
+  KeptGold::Shares shares = kept.all_over_part();
+  if (!gold_.fine().settings().part) {
+    const auto missing = static_cast<double>(gold_.fine().missing_tiles(near_, GoldStream::For::samples));
+    shares.columns = shares.tiles = (static_cast<double>(kept.tiles()) + missing) / tiles;
+  }
+  out.kept_bytes = static_cast<std::uint64_t>(static_cast<double>(kept.bytes()) * (shares.tiles - 1));
+  out.kept_seconds = kept.column_seconds() + kept.tile_seconds() * shares.columns;
 }
 
 std::vector<BrickMeasure> Forecaster::measured() const {

@@ -1,6 +1,7 @@
 // What a build will store and how long it will take, from a sample of its bricks.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -24,9 +25,28 @@ struct BuildForecast {
 /// Bricks that stand for all: those near the coverage, or of large grids those of some columns of blocks from
 /// the lowest to the highest, at places that stand for equal areas of the covered disc.
 std::vector<std::uint8_t> bricks_to_look_at(GoldStream& stream, const ParallelGeometry& geometry);
-/// Those of the columns of blocks from the axis outwards along x: neighbours read the same kept nodes, which
-/// take several times as long of cone beam.
-std::vector<std::uint8_t> bricks_on_radius(GoldStream& stream);
+/// Columns of bricks side by side that estimates of cone beam look at: neighbours read the same kept nodes,
+/// which take several times as long. Half of the grid along x by some cells, where bricks of every expected
+/// error are as frequent as in all of it. Positions of bricks, x and y, the ends not included.
+struct SampledColumns {
+  /// `base` holds F on the grid, `near` says which bricks may hold a tested node,
+  /// `tolerance` is what the node test may take. Cost: a pass over the samples.
+  SampledColumns(const Volume& base, const std::vector<std::uint8_t>& near, int granularity,
+                 double tolerance);
+  /// Of bricks that may hold a tested node, those in these columns.
+  [[nodiscard]] std::vector<std::uint8_t> of(std::vector<std::uint8_t> near) const;
+  /// Where kept nodes count for them: as far as filters reach from the samples that fits around them look at.
+  /// A fit forgets what lies beyond by a factor of four a sample.
+  [[nodiscard]] PlanePart part() const;
+  /// Whether that is so little of the grid, and what is kept around it, that it spares most of the work.
+  [[nodiscard]] bool is_worth_it() const;
+
+  std::array<std::int64_t, 2> first{}, end{};
+
+ private:
+  Grid grid_;
+  int granularity_;
+};
 
 /// Of what plans look at, forecasts builds of different tolerances. Keeps the prepared scan, in whose units
 /// it computes; what it takes and gives is in world units.
@@ -58,6 +78,7 @@ class Forecaster {
  private:
   struct Classified;
   std::vector<Classified> classify(const NodeTolerance& tolerance, const std::vector<std::uint8_t>& selected);
+  void add_kept(BuildForecast& out);
   double first_pass_seconds(const NodeTolerance& tolerance);
 
   std::shared_ptr<PreparedScan> prepared_;

@@ -175,6 +175,7 @@ class Planner {
                 plan_.settings.comparison.epsilon_of_max
                     ? largest_of_gold(state_, prepared_->filtered, prepared_->sups, plan_.grid, all.front())
                     : 0);
+    sample_columns();
     report(progress_, "plan", 0.3);
     // They are made of derivatives along the axes of parallel beam.
     if (!is_cone())
@@ -213,8 +214,8 @@ class Planner {
       looked_at_ = gold.fine().bricks_near_coverage();
       if (plan_.settings.forecast) {
         GoldStream& first = gold.coarse() ? *gold.coarse() : gold.fine();
-        looked_at_ = estimates_base() ? bricks_on_radius(first)
-                                      : bricks_to_look_at(first, prepared_->filtered.geometry);
+        looked_at_ = sampled_ ? sampled_->of(std::move(looked_at_))
+                              : bricks_to_look_at(first, prepared_->filtered.geometry);
         gold.fine().prepare(looked_at_, GoldStream::For::samples, {});
       }
     }
@@ -246,7 +247,14 @@ class Planner {
     plan_.estimated = true;
     plan_.notes.emplace_back(
         "estimated: the range from samples of linear interpolation at 4x, the bounds and what is foreseen "
-        "from columns of the grid between its axis and its edge");
+        "from columns of the grid");
+  }
+
+  void sample_columns() {
+    if (!estimates_base()) return;
+    const int g = plan_.layout.granularity;
+    sampled_.emplace(plan_.base, bricks_near(*coverage_, plan_.grid, g), g, plan_.epsilon_abs);
+    if (!sampled_->is_worth_it()) sampled_.reset();
   }
 
   void look_at_reference() {
@@ -266,7 +274,11 @@ class Planner {
     return is_cone() && plan_.settings.estimate && plan_.settings.forecast;
   }
   [[nodiscard]] bool grid_only() const { return plan_.settings.comparison.terms == Terms::grid; }
-  [[nodiscard]] GoldSettings settings_at(const Rates& r) const { return gold_settings(plan_, r, is_cone()); }
+  [[nodiscard]] GoldSettings settings_at(const Rates& r) const {
+    GoldSettings settings = gold_settings(plan_, r, is_cone());
+    if (sampled_) settings.part = sampled_->part();
+    return settings;
+  }
 
   std::shared_ptr<GoldSource> source_at(const Rates& r) { return prepared_->source(settings_at(r)); }
 
@@ -366,6 +378,7 @@ class Planner {
   std::uint64_t scan_bytes_ = 0;  // as read
   double preparation_ = 0;        // seconds that build will take again
   std::vector<std::uint8_t> looked_at_;
+  std::optional<SampledColumns> sampled_;  // of estimates of cone beam
   bool estimates_views_ = false;
 };
 

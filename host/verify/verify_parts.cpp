@@ -22,6 +22,15 @@ std::vector<std::uint8_t> layers_of(const std::vector<std::uint8_t>& selected, c
   return some;
 }
 
+/// To hold [first, last] of a tile too, as far as these lie in it.
+void widen(std::array<std::uint8_t, 4>& range, std::size_t axis, std::int64_t first, std::int64_t last) {
+  const auto in_tile = [](std::int64_t n) {
+    return static_cast<std::uint8_t>(std::clamp<std::int64_t>(n, 0, VDVR_VERIFY_TILE - 1));
+  };
+  range[axis] = std::min(range[axis], in_tile(first));
+  range[axis + 1] = std::max(range[axis + 1], in_tile(last));
+}
+
 }  // namespace
 
 // A brick whose middle lies further outside than half its diagonal and a cell's has no tested cell, nor has
@@ -69,12 +78,26 @@ VerifyNodes::Part VerifyField::nodes_of(const std::vector<std::uint8_t>& selecte
   }
   const std::int64_t across = VerifyNodes::tiles_across(p.nx);
   p.tiles.assign(at(across * VerifyNodes::tiles_across(p.ny)), 0);
+  const bool cone = !field_.views().empty();
+  const std::int64_t blocks = cone ? p.blocks_along() : 0, tall = std::int64_t{volume_.granularity} * p.along,
+                     around_z = cone ? (p.nz - 1 - (box.end[2] - box.first[2]) * tall) / 2 : 0;
+  p.blocks.assign(p.tiles.size() * at(blocks), 0);
+  constexpr std::int64_t tile_side = VDVR_VERIFY_TILE;
+  if (cone) p.ranges.assign(p.tiles.size(), {tile_side, 0, tile_side, 0});
   for (std::int64_t i = 0; i < static_cast<std::int64_t>(selected.size()); ++i) {
     if (!selected[at(i)]) continue;
     const std::int64_t x = (i % n[0] - box.first[0]) * side, y = (i / n[0] % n[1] - box.first[1]) * side;
+    const std::int64_t z = (i / n[0] / n[1] - box.first[2]) * tall, first_block = z / 16,
+                       last_block = cone ? (z + tall + 2 * around_z) / 16 : -1;
     for (std::int64_t ty = y / VDVR_VERIFY_TILE; ty <= (y + side + 2 * around) / VDVR_VERIFY_TILE; ++ty)
-      for (std::int64_t tx = x / VDVR_VERIFY_TILE; tx <= (x + side + 2 * around) / VDVR_VERIFY_TILE; ++tx)
+      for (std::int64_t tx = x / VDVR_VERIFY_TILE; tx <= (x + side + 2 * around) / VDVR_VERIFY_TILE; ++tx) {
         p.tiles[at(ty * across + tx)] = 1;
+        if (!cone) continue;
+        widen(p.ranges[at(ty * across + tx)], 0, x - tx * tile_side, x + side + 2 * around - tx * tile_side);
+        widen(p.ranges[at(ty * across + tx)], 2, y - ty * tile_side, y + side + 2 * around - ty * tile_side);
+        for (std::int64_t b = first_block; b <= last_block; ++b)
+          p.blocks[at((ty * across + tx) * blocks + b)] = 1;
+      }
   }
   return p;
 }

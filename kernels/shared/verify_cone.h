@@ -6,6 +6,9 @@
 // Heights of a work-item, and of a block, which has one set of numbers for each view.
 #define VDVR_VERIFY_CONE_HEIGHTS 8
 #define VDVR_VERIFY_CONE_BLOCK 16
+// Where eight columns are weighted once for a block: so many rows at most, and so many views together.
+#define VDVR_VERIFY_CONE_STRIP 64
+#define VDVR_VERIFY_CONE_VIEWS 4
 
 typedef struct {
   int accumulate;       // whether the views are added to what the nodes hold, or written

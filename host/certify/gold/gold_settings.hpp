@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "host/certify/kept/kept_gold.hpp"
 #include "host/field/fbp/reconstruct.hpp"
 #include "host/volume/quantise.hpp"
 #include "vdvr/expert/mixed_volume.hpp"
@@ -42,6 +43,8 @@ struct GoldSettings {
   /// Of heights that blocks of kept gold share (kept_gold.hpp).
   std::uint64_t heights_bytes = std::uint64_t{1} << 30;
 
+  /// Of estimates: where gold is kept, the rest counting as 0; all of it where there is none.
+  std::optional<PlanePart> part{};
   double least_reach = 0;  ///< of kept gold: what later settings will ask for
   /// How far outside the covered region samples are kept: as far as a base cell that meets it reaches.
   [[nodiscard]] double kept() const {

@@ -28,6 +28,7 @@ GoldSource::GoldSource(opencl::State& state, const FilteredScan& scan, const Fie
                        const GoldSettings& settings)
     : kept(state, scan, sups, settings.grid, gold_reach(settings), settings.upsampling,
            settings.interpolation, settings.heights_bytes) {
+  if (settings.part) kept.keep_only(*settings.part);
   if (!settings.base_only) remainder.emplace(state, kept, scan, sups, settings.grid, settings.granularity);
 }
 

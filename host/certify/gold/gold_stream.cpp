@@ -199,10 +199,8 @@ void GoldStream::run_works(std::span<const Work> works, const std::vector<std::u
   }
 }
 
-std::vector<std::uint8_t> GoldStream::bricks_near_coverage() const {
-  const Grid& grid = settings_.grid;
-  const std::int64_t g = settings_.granularity;
-  const Bricks bricks(grid, settings_.granularity);
+std::vector<std::uint8_t> bricks_near(const Coverage& coverage, const Grid& grid, std::int64_t g) {
+  const Bricks bricks(grid, to_int(g));
   const Index3 n = bricks.along();
   std::vector<std::uint8_t> near(at(bricks.size()), 0);
   const double reach = std::hypot(grid.spacing[0], grid.spacing[1]) * (0.5 * static_cast<double>(g) + 1);
@@ -212,10 +210,14 @@ std::vector<std::uint8_t> GoldStream::bricks_near_coverage() const {
           grid.origin[0] + (static_cast<double>(x) + 0.5) * static_cast<double>(g) * grid.spacing[0];
       const double cy =
           grid.origin[1] + (static_cast<double>(y) + 0.5) * static_cast<double>(g) * grid.spacing[1];
-      if (coverage_.margin(cx, cy) < -reach) continue;
+      if (coverage.margin(cx, cy) < -reach) continue;
       for (std::int64_t z = 0; z < n[2]; ++z) near[at(bricks.number({x, y, z}))] = 1;
     }
   return near;
+}
+
+std::vector<std::uint8_t> GoldStream::bricks_near_coverage() const {
+  return bricks_near(coverage_, settings_.grid, settings_.granularity);
 }
 
 // Coverage margins of gold's columns; columns beyond the grid are nobody's. A column's place follows from its

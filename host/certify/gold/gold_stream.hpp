@@ -33,6 +33,9 @@
 
 namespace vdvr {
 
+/// Bricks of `g` cells a side that may hold a tested node: their middles lie that near to the coverage.
+std::vector<std::uint8_t> bricks_near(const Coverage& coverage, const Grid& grid, std::int64_t g);
+
 /// Gold samples over all blocks, halos included, and the seconds that these took.
 struct GoldSpent {
   double samples = 0, seconds = 0;

@@ -58,7 +58,7 @@ PreparedScan::PreparedScan(opencl::State& device, const ScanInUnits& from, const
 std::shared_ptr<GoldSource> PreparedScan::source(const GoldSettings& s) {
   if (!source_ || !is_same_grid(s.grid, settings_.grid) || s.granularity != settings_.granularity ||
       s.upsampling != settings_.upsampling || s.interpolation != settings_.interpolation ||
-      gold_reach(s) > gold_reach(settings_)) {
+      s.part != settings_.part || gold_reach(s) > gold_reach(settings_)) {
     source_ = nullptr;  // before the next one is allocated
     source_ = std::make_shared<GoldSource>(state, filtered, sups, s);
     settings_ = s;

@@ -132,7 +132,7 @@ double KeptGold::room_to_sources(double from, const std::pair<double, double>& h
 ConeLattice KeptGold::cone_lattice(double reach) const {
   constexpr double cells_around = 4;
   const double around =
-      cells_around * grid_.spacing[2] + 2 * static_cast<double>(half_taps_[2]) * spacing_[2];
+      cells_around * grid_.spacing[2] + (static_cast<double>(half_taps_[2]) + 1) * spacing_[2];
   const auto node = [&](double z) { return (z - grid_.origin[2]) / spacing_[2]; };
   const auto margin = static_cast<double>(2 * run_margin);
   const double low = std::clamp(node(coverage_.heights().first - around), -margin, 1e9),
@@ -216,6 +216,18 @@ double KeptGold::margin_of(const TileAt& tile) const {
          half * std::hypot(spacing_[0], spacing_[1]);
 }
 
+bool KeptGold::is_kept(const TileAt& tile) const {
+  if (!(margin_of(tile) >= -reach_)) return false;
+  if (!part_) return true;
+  const std::array<std::int64_t, 2> first{tile.second * side, tile.first * side};
+  for (std::size_t a = 0; a < 2; ++a) {
+    const double low = grid_.origin[a] + static_cast<double>(first[a]) * spacing_[a],
+                 high = low + static_cast<double>(side - 1) * spacing_[a];
+    if (high < part_->low[a] || low > part_->high[a]) return false;
+  }
+  return true;
+}
+
 std::vector<KeptGold::TileAt> KeptGold::new_tiles(const GoldLattice& lattice,
                                                   const std::vector<GoldBox>& boxes) const {
   std::set<TileAt> out;
@@ -223,7 +235,7 @@ std::vector<KeptGold::TileAt> KeptGold::new_tiles(const GoldLattice& lattice,
     const Span x = span(lattice, 0, box), y = span(lattice, 1, box);
     for (std::int64_t ty = floor_div(y.low, side); ty * side < y.low + y.count; ++ty)
       for (std::int64_t tx = floor_div(x.low, side); tx * side < x.low + x.count; ++tx)
-        if (!tiles_.contains({ty, tx}) && margin_of({ty, tx}) >= -reach_) out.insert({ty, tx});
+        if (!tiles_.contains({ty, tx}) && is_kept({ty, tx})) out.insert({ty, tx});
   }
   return {out.begin(), out.end()};
 }
@@ -236,7 +248,7 @@ std::vector<KeptGold::TileAt> KeptGold::all_tiles() const {
   const auto last = [&](std::size_t a) { return floor_div(grid_.cells[a] * rates_[a] + beyond(a), side); };
   for (std::int64_t ty = floor_div(-beyond(1), side); ty <= last(1); ++ty)
     for (std::int64_t tx = floor_div(-beyond(0), side); tx <= last(0); ++tx)
-      if (margin_of({ty, tx}) >= -reach_) out.emplace_back(ty, tx);
+      if (is_kept({ty, tx})) out.emplace_back(ty, tx);
   return out;
 }
 
@@ -251,7 +263,7 @@ void KeptGold::prepare(const GoldLattice& lattice, const std::vector<GoldBox>& b
   if (tiles.empty()) return;
   std::vector<TileAt> all = all_tiles();
   std::erase_if(all, [&](const TileAt& tile) { return tiles_.contains(tile); });
-  if (2 * tiles.size() > all.size()) {
+  if (part_ || 2 * tiles.size() > all.size()) {
     std::set<TileAt> both(tiles.begin(), tiles.end());
     both.insert(all.begin(), all.end());
     tiles.assign(both.begin(), both.end());
@@ -335,16 +347,34 @@ void KeptGold::back_project_tiles(std::span<const TileAt> tiles, const Progress&
     tiles_[tiles[i]] = {first_page + i / each, count(static_cast<std::int64_t>(i % each)) * tile};
 }
 
+KeptGold::Shares KeptGold::all_over_part() {
+  const auto sizes = [&] {
+    const std::vector<TileAt> tiles = all_tiles();
+    Shares s{0, static_cast<double>(tiles.size())};
+    for (const auto& [first, last] : wanted(blocks_of(tiles))) s.columns += std::max(0, last - first + 1);
+    return s;
+  };
+  const Shares of_part = sizes();
+  const std::optional<PlanePart> part = std::exchange(part_, std::nullopt);
+  const Shares all = sizes();
+  part_ = part;
+  return {all.columns / std::max(1.0, of_part.columns), all.tiles / std::max(1.0, of_part.tiles)};
+}
+
 // By row of each tile the first and last node that is kept: the region is convex, so that all between them
 // are.
 std::vector<std::array<std::int32_t, 2>> KeptGold::wanted(const ColumnBlocks& blocks) const {
   std::vector<std::array<std::int32_t, 2>> out;
+  const auto in_part = [&](double x, double y) {
+    return !part_ || (x >= part_->low[0] && x <= part_->high[0] && y >= part_->low[1] && y <= part_->high[1]);
+  };
   for (const auto& [x0, y0] : blocks.first)
     for (std::int64_t y = 0; y < side; ++y) {
       std::array<std::int32_t, 2> row{to_int(side), -1};
       for (std::int64_t x = 0; x < side; ++x)
-        if (coverage_.margin_above(x0 + static_cast<double>(x) * spacing_[0],
-                                   y0 + static_cast<double>(y) * spacing_[1], -reach_) >= -reach_) {
+        if (const double at_x = x0 + static_cast<double>(x) * spacing_[0],
+            at_y = y0 + static_cast<double>(y) * spacing_[1];
+            in_part(at_x, at_y) && coverage_.margin_above(at_x, at_y, -reach_) >= -reach_) {
           row[0] = std::min(row[0], to_int(x));
           row[1] = to_int(x);
         }

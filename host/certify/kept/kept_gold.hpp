@@ -40,6 +40,12 @@ struct GoldErrors {
   double ramp = 0;  ///< of F^ from F, anywhere
 };
 
+/// A rectangle across z, world units.
+struct PlanePart {
+  std::array<double, 2> low{}, high{};
+  bool operator==(const PlanePart&) const = default;
+};
+
 /// A box of nodes of a lattice: node 0 is the grid's first sample.
 struct GoldBox {
   Index3 first{}, nodes{};
@@ -115,6 +121,15 @@ class KeptGold {
   [[nodiscard]] std::uint64_t bytes() const;
   [[nodiscard]] std::int64_t missing(const GoldLattice& lattice, const std::vector<GoldBox>& boxes) const;
 
+  /// For estimates, before anything is prepared: nodes outside of that part hold 0. What prepare() finds
+  /// missing it then makes for the whole part.
+  void keep_only(const PlanePart& part) { part_ = part; }
+  /// Where there is a part: how many times its columns, and its tiles, all would take.
+  struct Shares {
+    double columns = 1, tiles = 1;
+  };
+  [[nodiscard]] Shares all_over_part();
+
  private:
   /// Rows of the detector up to which gold's heights are products with all of them: beyond, heights at half a
   /// pixel and filters between them are the cheaper.
@@ -149,6 +164,8 @@ class KeptGold {
   /// All within reach of the covered part of the grid.
   [[nodiscard]] std::vector<TileAt> all_tiles() const;
   [[nodiscard]] double margin_of(const TileAt& tile) const;
+  /// Whether any node of it may be kept.
+  [[nodiscard]] bool is_kept(const TileAt& tile) const;
   [[nodiscard]] std::vector<std::array<std::int32_t, 2>> wanted(const ColumnBlocks& blocks) const;
   [[nodiscard]] ColumnBlocks blocks_of(std::span<const TileAt> tiles) const;
   [[nodiscard]] UpsampledSlab upsampled(std::int64_t first, std::int64_t end);
@@ -198,6 +215,7 @@ class KeptGold {
   Interpolation interpolation_;
   Index3 half_taps_{8, 8, 8};  // of filters between kept nodes, by axis
   Coverage coverage_;
+  std::optional<PlanePart> part_;
   UpsampledColumns columns_;
   Index3 rates_{1, 1, 1};
   Vec3 spacing_{};  // of kept nodes; of the heights made of the rows, along z

@@ -148,7 +148,9 @@ struct VerifyConeNodes::Table {
   Table(opencl::State& of, const Window& of_places, std::int64_t at_once)
       : state(of), window(of_places), views(at_once), counted(of, bytes(), "dense filtered projections") {
     host.resize(at(views * per_view()));
-    device = opencl::DeviceArray<float>(state, count(views * per_view()), "dense filtered projections");
+    // Strips are read in whole vectors, beyond the last row too.
+    device = opencl::DeviceArray<float>(state, count(views * per_view() + VDVR_VERIFY_CONE_STRIP),
+                                        "dense filtered projections");
   }
   ~Table() = default;
   Table(const Table&) = delete;
@@ -204,19 +206,36 @@ void VerifyConeNodes::fill(Table& table, std::int64_t first_view) const {
   table.device.write(std::span<const float>(table.host).first(at(table.filled * table.per_view())));
 }
 
+/// Wanted tiles that are not too far out, and of each which blocks of heights: [tile][block].
+struct VerifyConeNodes::Tiles {
+  std::vector<cl_int2> first;
+  std::vector<std::uint8_t> blocks;
+  std::vector<cl_uchar4> ranges;  // first and last x, then y
+  opencl::DeviceArray<cl_int2> device_first;
+  opencl::DeviceArray<cl_uchar4> device_ranges;
+  opencl::DeviceArray<std::uint8_t> device_blocks;
+};
+
 ConeNodeFacts VerifyConeNodes::make(const Nodes& wanted, const opencl::DeviceArray<float>& nodes) {
   const std::int64_t K = field_.geometry().views();
   ConeNodeFacts facts;
   const double side_x = tile_nodes * wanted.spacing[0], side_y = tile_nodes * wanted.spacing[1];
-  std::vector<cl_int2> tiles;
-  for (const auto& t : wanted.tiles) {
+  Tiles tiles;
+  const std::int64_t blocks = wanted.heights / block;
+  for (std::size_t i = 0; i < wanted.tiles.size(); ++i) {
+    const auto& t = wanted.tiles[i];
     const double x = wanted.first[0] + static_cast<double>(t[0]) * wanted.spacing[0] + 0.5 * side_x,
                  y = wanted.first[1] + static_cast<double>(t[1]) * wanted.spacing[1] + 0.5 * side_y;
-    if (coverage_.margin(x, y) >= -furthest_ - 0.5 * std::hypot(side_x, side_y))
-      tiles.push_back({{to_int(t[0]), to_int(t[1])}});
+    if (coverage_.margin(x, y) < -furthest_ - 0.5 * std::hypot(side_x, side_y)) continue;
+    tiles.first.push_back({{to_int(t[0]), to_int(t[1])}});
+    constexpr std::array<std::uint8_t, 4> whole{0, tile_nodes - 1, 0, tile_nodes - 1};
+    const auto& range = wanted.ranges.empty() ? whole : wanted.ranges[i];
+    tiles.ranges.push_back({{range[0], range[1], range[2], range[3]}});
+    for (std::int64_t b = 0; b < blocks; ++b)
+      tiles.blocks.push_back(wanted.blocks.empty() ? std::uint8_t{1} : wanted.blocks[i * at(blocks) + at(b)]);
   }
-  if (tiles.empty()) return facts;
-  const Window window = window_of(wanted, tiles);
+  if (tiles.first.empty()) return facts;
+  const Window window = window_of(wanted, tiles.first);
   // Sums within a call and sums of calls err alike.
   const auto even = std::clamp<std::int64_t>(std::llround(std::sqrt(static_cast<double>(K))), 8, 32);
   const std::uint64_t each = sizeof(float) * count(window.columns * window.rows),
@@ -224,10 +243,12 @@ ConeNodeFacts VerifyConeNodes::make(const Nodes& wanted, const opencl::DeviceArr
   facts.together = std::clamp<std::int64_t>(static_cast<std::int64_t>(share / each), 1, std::min(even, K));
   facts.calls = (K + facts.together - 1) / facts.together;
   Table table(state_, window, facts.together);
-  const opencl::DeviceArray<cl_int2> device_tiles(state_, std::span<const cl_int2>(tiles), "tiles of nodes");
+  tiles.device_first = {state_, std::span<const cl_int2>(tiles.first), "tiles of nodes"};
+  tiles.device_blocks = {state_, std::span<const std::uint8_t>(tiles.blocks), "heights of tiles of nodes"};
+  tiles.device_ranges = {state_, std::span<const cl_uchar4>(tiles.ranges), "wanted nodes of tiles"};
   for (std::int64_t first = 0; first < K; first += facts.together) {
     fill(table, first);
-    back_project(wanted, tiles, table, device_tiles, nodes, facts);
+    back_project(wanted, tiles, table, nodes, facts);
     opencl::finish(state_, "nodes of the field to verify against");  // before the table changes
   }
   const double host = 32 * 0x1p-53 * window.magnitude;
@@ -263,57 +284,66 @@ Place place_of(const ViewMatrix& m, std::size_t axis, const Vec3& seen, const Ve
   return out;
 }
 
+/// One view's numbers about a block's middle; what they err, and how many rows of the table a step along z
+/// takes at most, are taken into account.
+ViewNumbers numbers_about(const ViewMatrix& m, const Vec3& middle, const Vec3& spacing,
+                          std::int64_t first_column, std::int64_t first_row, ConeNodeFacts& facts,
+                          double& row_step) {
+  const Vec3 seen = projected(m, middle);
+  double growth = 0;
+  ViewNumbers out{};
+  for (std::size_t e = 0; e < 3; ++e) {
+    out.lambda.s[e] = static_cast<float>(m[2][e] * spacing[e]);
+    growth += std::abs(m[2][e]) * spacing[e] * half_block[e];
+  }
+  out.lambda.s[3] = static_cast<float>(seen[2]);
+  const double least = seen[2] - growth, cancellation = (seen[2] + growth) / least;
+  const Place at_u = place_of(m, 0, seen, spacing, least, cancellation, first_column),
+              at_v = place_of(m, 1, seen, spacing, least, cancellation, first_row);
+  out.u = at_u.numbers;
+  out.v = at_v.numbers;
+  out.whole = {{at_u.whole, at_v.whole, 0, 0}};
+  facts.place_u = std::max(facts.place_u, at_u.error);
+  facts.place_v = std::max(facts.place_v, at_v.error);
+  facts.cancellation = std::max(facts.cancellation, cancellation);
+  row_step = std::max(row_step, std::abs(static_cast<double>(at_v.numbers.s[2])) / least);
+  return out;
+}
+
 }  // namespace
 
-void VerifyConeNodes::back_project(const Nodes& wanted, const std::vector<cl_int2>& tiles, const Table& table,
-                                   const opencl::DeviceArray<cl_int2>& device_tiles,
+void VerifyConeNodes::back_project(const Nodes& wanted, const Tiles& tiles, const Table& table,
                                    const opencl::DeviceArray<float>& nodes, ConeNodeFacts& facts) {
   const std::int64_t blocks = wanted.heights / block, of_tile = blocks * table.filled,
-                     all = static_cast<std::int64_t>(tiles.size()),
+                     all = static_cast<std::int64_t>(tiles.first.size()),
                      together = std::max<std::int64_t>(
                          1, static_cast<std::int64_t>(most_numbers / sizeof(ViewNumbers)) / of_tile);
   const int lanes = opencl::lanes_of(state_.info, VDVR_VERIFY_CONE_HEIGHTS);
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrVerifyCone> kernel(
-      state_, "verify/witness/verify_cone", "verify_cone",
-      {{"VDVR_UPRIGHT", upright_ ? "1" : "0"}, {"VDVR_LANES", std::to_string(lanes)}});
   std::mutex lock;
   for (std::int64_t first = 0; first < all; first += together) {
     const std::int64_t n = std::min(together, all - first);
     std::vector<ViewNumbers> numbers(at(n * of_tile));
+    double row_step = 0;
     parallel_for(n, {}, "", [&](std::int64_t t) {
       ConeNodeFacts own;
-      for (std::int64_t b = 0; b < blocks; ++b)
-        for (std::int64_t k = 0; k < table.filled; ++k) {
-          const ViewMatrix& m = field_.views()[at(table.first_view + k)];
-          const std::array<double, 3> middle{static_cast<double>(tiles[at(first + t)].s[0]) + half_block[0],
-                                             static_cast<double>(tiles[at(first + t)].s[1]) + half_block[1],
-                                             static_cast<double>(b * block) + half_block[2]};
-          Vec3 p{};
-          for (std::size_t a = 0; a < 3; ++a) p[a] = wanted.first[a] + middle[a] * wanted.spacing[a];
-          const Vec3 seen = projected(m, p);
-          double growth = 0;
-          ViewNumbers& out = numbers[at((t * blocks + b) * table.filled + k)];
-          for (std::size_t e = 0; e < 3; ++e) {
-            out.lambda.s[e] = static_cast<float>(m[2][e] * wanted.spacing[e]);
-            growth += std::abs(m[2][e]) * wanted.spacing[e] * half_block[e];
-          }
-          out.lambda.s[3] = static_cast<float>(seen[2]);
-          const double least = seen[2] - growth, cancellation = (seen[2] + growth) / least;
-          const Place at_u = place_of(m, 0, seen, wanted.spacing, least, cancellation,
-                                      table.window.first_column),
-                      at_v =
-                          place_of(m, 1, seen, wanted.spacing, least, cancellation, table.window.first_row);
-          out.u = at_u.numbers;
-          out.v = at_v.numbers;
-          out.whole = {{at_u.whole, at_v.whole, 0, 0}};
-          own.place_u = std::max(own.place_u, at_u.error);
-          own.place_v = std::max(own.place_v, at_v.error);
-          own.cancellation = std::max(own.cancellation, cancellation);
-        }
+      double own_step = 0;
+      for (std::int64_t b = 0; b < blocks; ++b) {
+        if (tiles.blocks[at((first + t) * blocks + b)] == 0) continue;
+        const cl_int2& node = tiles.first[at(first + t)];
+        Vec3 middle{static_cast<double>(node.s[0]), static_cast<double>(node.s[1]),
+                    static_cast<double>(b * block)};
+        for (std::size_t a = 0; a < 3; ++a)
+          middle[a] = wanted.first[a] + (middle[a] + half_block[a]) * wanted.spacing[a];
+        for (std::int64_t k = 0; k < table.filled; ++k)
+          numbers[at((t * blocks + b) * table.filled + k)] =
+              numbers_about(field_.views()[at(table.first_view + k)], middle, wanted.spacing,
+                            table.window.first_column, table.window.first_row, own, own_step);
+      }
       const std::lock_guard guard(lock);
       facts.place_u = std::max(facts.place_u, own.place_u);
       facts.place_v = std::max(facts.place_v, own.place_v);
       facts.cancellation = std::max(facts.cancellation, own.cancellation);
+      row_step = std::max(row_step, own_step);
     });
     const opencl::DeviceArray<ViewNumbers> on_device(state_, std::span<const ViewNumbers>(numbers),
                                                      "view positions");
@@ -326,10 +356,21 @@ void VerifyConeNodes::back_project(const Nodes& wanted, const std::vector<cl_int
                                .blocks = to_int(blocks),
                                .nx = to_int(wanted.nx),
                                .all_heights = to_int(wanted.heights)};
-    const std::int64_t groups = up_to(wanted.used, VDVR_VERIFY_CONE_HEIGHTS) / lanes;
+    // Eight rows from each of a block's places on; places may round to the row beside. A device whose
+    // work-items have no caches of their own gains nothing.
+    const bool strips = upright_ && lanes == VDVR_VERIFY_CONE_HEIGHTS &&
+                        static_cast<double>(block - 1) * row_step + cone_points + 2 <= VDVR_VERIFY_CONE_STRIP;
+    const std::int64_t groups = strips ? blocks : up_to(wanted.used, VDVR_VERIFY_CONE_HEIGHTS) / lanes;
+    opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrVerifyCone>
+        kernel(state_, "verify/witness/verify_cone", "verify_cone",
+               {{"VDVR_UPRIGHT", upright_ ? "1" : "0"},
+                {"VDVR_STRIPS", strips ? "1" : "0"},
+                {"VDVR_LANES", std::to_string(lanes)}});
     kernel(opencl::in_groups(state_.info, {count(groups), count(tile_nodes), count(n)},
-                             {count(std::min<std::int64_t>(groups, 8)), count(tile_nodes), 1}),
-           nodes.buffer(), table.device.buffer(), on_device.buffer(), device_tiles.buffer(), shape);
+                             {count(strips ? 1 : std::min<std::int64_t>(groups, 8)), count(tile_nodes), 1},
+                             strips ? 1 : 0),
+           nodes.buffer(), table.device.buffer(), on_device.buffer(), tiles.device_first.buffer(),
+           tiles.device_blocks.buffer(), tiles.device_ranges.buffer(), shape);
     opencl::finish(state_, "nodes of the field to verify against");  // before the numbers go
   }
 }

@@ -46,6 +46,9 @@ class VerifyConeNodes {
     std::int64_t nx = 0, heights = 0;                ///< of the array; heights to a multiple of 16
     std::int64_t used = 0;                           ///< of the heights
     std::vector<std::array<std::int64_t, 2>> tiles;  ///< wanted, by their first nodes x, y
+    std::vector<std::uint8_t> blocks;                ///< [tile][heights / 16]: 0: not wanted; all where empty
+    /// [tile]: in it the first and last x, then y, that are wanted; all where empty.
+    std::vector<std::array<std::uint8_t, 4>> ranges;
   };
   /// Writes those of the wanted tiles that are not too far out. Throws InputError where such a tile reaches a
   /// source's plane. Cost: columns * rows * (columns + 6 rows) * 6 multiply-adds a view on the host, or fewer
@@ -57,9 +60,9 @@ class VerifyConeNodes {
   struct Table;
   [[nodiscard]] Window window_of(const Nodes& wanted, const std::vector<cl_int2>& tiles) const;
   void fill(Table& table, std::int64_t first_view) const;
-  void back_project(const Nodes& wanted, const std::vector<cl_int2>& tiles, const Table& table,
-                    const opencl::DeviceArray<cl_int2>& device_tiles, const opencl::DeviceArray<float>& nodes,
-                    ConeNodeFacts& facts);
+  struct Tiles;
+  void back_project(const Nodes& wanted, const Tiles& tiles, const Table& table,
+                    const opencl::DeviceArray<float>& nodes, ConeNodeFacts& facts);
 
   opencl::State& state_;
   const ExactField& field_;

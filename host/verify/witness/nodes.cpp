@@ -188,8 +188,15 @@ void VerifyNodes::make_cone_nodes(const Part& part) {
   wanted.nx = tile_columns_ * tile;
   wanted.heights = rows_padded_;
   wanted.used = part.nz;
-  for (std::int64_t t = 0; t < static_cast<std::int64_t>(part.tiles.size()); ++t)
-    if (part.tiles[at(t)]) wanted.tiles.push_back({t % tile_columns_ * tile, t / tile_columns_ * tile});
+  const std::int64_t blocks = part.blocks_along();
+  for (std::int64_t t = 0; t < static_cast<std::int64_t>(part.tiles.size()); ++t) {
+    if (!part.tiles[at(t)]) continue;
+    wanted.tiles.push_back({t % tile_columns_ * tile, t / tile_columns_ * tile});
+    if (!part.ranges.empty()) wanted.ranges.push_back(part.ranges[at(t)]);
+    if (part.blocks.empty()) continue;
+    const auto of_tile = std::span(part.blocks).subspan(at(t * blocks), at(blocks));
+    wanted.blocks.insert(wanted.blocks.end(), of_tile.begin(), of_tile.end());
+  }
   cone_facts_ = cone_->make(wanted, *nodes_);
 }
 

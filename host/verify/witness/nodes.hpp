@@ -31,6 +31,11 @@ class VerifyNodes {
     int along = 1;                                          ///< heights: to a cell of the grid
     std::int64_t first_z = 0, nz = 0;                       ///< heights
     std::vector<std::uint8_t> tiles;  ///< [y][x]: tiles of nodes that are wanted, tiles_across(n) a side
+    /// Of cone beam, [tile][16 heights]: those of a wanted tile that are; all where empty.
+    std::vector<std::uint8_t> blocks;
+    /// Of cone beam, of a wanted tile the first and last x, then y, that are wanted; all where empty.
+    std::vector<std::array<std::uint8_t, 4>> ranges;
+    [[nodiscard]] std::int64_t blocks_along() const { return (nz + 15) / 16; }
   };
   static std::int64_t tiles_across(std::int64_t nodes) {
     return (nodes + VDVR_VERIFY_TILE - 1) / VDVR_VERIFY_TILE;
