@@ -231,7 +231,7 @@ Axis searched(const PicturePairs& pairs, double place) {
       axis.place -= n.a / n.aa;
       n = total(equations(pairs, axis));
     }
-    const double rest = n.samples > 0 ? n.square / static_cast<double>(n.samples) : INFINITY;
+    const double rest = n.samples > 0 ? n.square / static_cast<double>(n.samples) : HUGE_VAL;
     if (rest < least) least = rest, best = axis;
   }
   return best;
@@ -251,7 +251,7 @@ double uncertainty_of(const std::vector<Normal>& of_block) {
   double mean = 0, square = 0;
   for (const double roll : without) mean += roll / n;
   for (const double roll : without) square += std::pow(roll - mean, 2);
-  return n < 3 ? INFINITY : std::sqrt(square * (n - 1) / n);
+  return n < 3 ? HUGE_VAL : std::sqrt(square * (n - 1) / n);
 }
 
 }  // namespace
