@@ -268,7 +268,8 @@ assert found.significant and abs(found.roll_deg - roll) < 4 * found.uncertainty_
 followed = vdvr.find_roll(scan)
 print(f"roll found of what is followed: {followed.roll_deg:.3f} +- {followed.uncertainty_deg:.3f}")
 assert not followed.significant and abs(followed.roll_deg - roll) < 4 * followed.uncertainty_deg
-raises(vdvr.InputError, "from -10 to 10", lambda: vdvr.Scan(leaning, turned, axis_roll=float("nan")))
+raises(vdvr.InputError, "from -10 to 10", lambda: vdvr.Scan(leaning, turned, axis_roll=10.5))
+raises(vdvr.InputError, "not finite", lambda: vdvr.Scan(leaning, turned, axis_roll=float("nan")))
 scan.save("upright.h5")
 again = vdvr.read_scan("upright.h5")
 assert again.axis_roll == 0 and np.array_equal(again.data, scan.data)
