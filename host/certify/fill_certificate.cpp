@@ -58,7 +58,8 @@ Certificate fill_certificate(const Inputs& in, Device& device, const ProjectionS
     // Two sums in fp32, and this product.
     c.brick_totals.push_back(m.total < 0 ? -1.0f : m.total * (1 + 0x1p-21f));
     if (m.total < 0) continue;
-    c.measured_max = std::max(c.measured_max, static_cast<double>(m.error));
+    // Finer gold lowers a total where nodes of the coarser lie beyond what is covered: those do not count.
+    c.measured_max = std::max(c.measured_max, static_cast<double>(std::min(m.error, m.total)));
     if (!worst || m.total > worst->total) worst = &m;
   }
   if (worst) {

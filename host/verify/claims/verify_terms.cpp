@@ -159,7 +159,7 @@ class Totals {
     const auto measure = [&](GoldStream& gold) {
       run(gold, selected, progress, [&](const BrickMeasure& m) {
         if (m.total >= 0) {
-          if (&gold == &gold_.fine()) error_ = std::max(error_, static_cast<double>(m.error));
+          if (&gold == &gold_.fine()) error_ = std::max(error_, error_that_counts(m));
           most_ = std::max(most_, static_cast<double>(m.error) + arithmetic() + arithmetic_of_build());
         }
         if (!agrees(m)) low.push_back(m);
@@ -267,6 +267,12 @@ class Totals {
     const auto stored = static_cast<double>(stored_.brick_totals[at(m.brick)]);
     if (m.total < 0) return true;
     return stored >= 0 && stored >= static_cast<double>(m.total) - tolerance(m);
+  }
+
+  // Of a brick that finer gold decided, no more than its total: nodes with larger errors are not covered.
+  [[nodiscard]] double error_that_counts(const BrickMeasure& m) const {
+    const auto error = static_cast<double>(m.error);
+    return is_below(m) ? std::min(error, static_cast<double>(stored_.brick_totals[at(m.brick)])) : error;
   }
 
   [[nodiscard]] bool is_below(const BrickMeasure& m) const {

@@ -87,7 +87,7 @@ struct Certificate {
   double total_buffer = 0;
   std::optional<double> total_image3d;
   ErrorBudget budget;
-  double measured_max = 0;    ///< max |V - gold| over tested gold nodes
+  double measured_max = 0;    ///< max |V - gold| over tested gold nodes; of a brick at most its total
   double measured_total = 0;  ///< max over them of |V - gold| + T + P
   /// [bz][by][bx] the same brick by brick, whose largest is measured_total; negative where nothing was
   /// tested. Empty for files of earlier versions. Not in the JSON: a dataset of the file.
