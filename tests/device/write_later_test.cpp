@@ -1,6 +1,7 @@
-// Small arrays that are written without waiting, and small buffers that are used again.
+// Small arrays that are written without waiting, and buffers and kernels that are used again.
 #define BOOST_TEST_MODULE write_later
 #include "host/base/opencl/write_later.hpp"
+#include "host/base/opencl/kernel.hpp"
 
 #include <boost/test/unit_test.hpp>
 #include <numeric>
@@ -45,6 +46,57 @@ BOOST_AUTO_TEST_CASE(buffers_of_all_sizes_are_used_again_in_order) {
       if (i % 2 == 0) held = std::move(array);
     }
   }
+}
+
+// More than may wait at once, in pieces that fit a page of copies and in pieces that do not.
+BOOST_AUTO_TEST_CASE(what_is_written_goes_out_from_pages_that_are_used_again) {
+  Device device;
+  opencl::State& state = device.state();
+  std::vector<opencl::DeviceArray<int>> arrays;
+  const auto values = [](std::size_t i) {
+    return std::vector<int>(i % 3 == 0 ? 700'000 : 1 + 977 * (i % 7), static_cast<int>(i));
+  };
+  for (std::size_t i = 0; i < 100; ++i) arrays.push_back(opencl::copied<int>(state, values(i), "numbers"));
+  for (std::size_t i = 0; i < 100; ++i) BOOST_TEST((arrays[i].to_host() == values(i)));
+}
+
+// Of a square of 16 x 16 numbers, rows become columns.
+BOOST_AUTO_TEST_CASE(launchers_have_their_own_arguments) {
+  Device device;
+  opencl::State& state = device.state();
+  using Turn = opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int>;
+  const auto launcher = [&] { return Turn(state, "certify/bounds/projection_bounds", "turn"); };
+  const auto square = [](int first) {
+    std::vector<float> out(256);
+    std::iota(out.begin(), out.end(), static_cast<float>(first));
+    return out;
+  };
+  const auto is_turned = [](const opencl::DeviceArray<float>& of, int first) {
+    const std::vector<float> got = of.to_host();
+    for (std::size_t i = 0; i < 256; ++i)
+      if (got[i] != static_cast<float>(first) + static_cast<float>(i % 16 * 16 + i / 16)) return false;
+    return true;
+  };
+  const auto turn = [&](Turn& by, const opencl::DeviceArray<float>& to,
+                        const opencl::DeviceArray<float>& from) {
+    by({{16, 1, 1}, {1, 1, 1}}, to.buffer(), from.buffer(), 1, 16, 16);
+  };
+  const auto one = opencl::copied<float>(state, square(0), "one"),
+             two = opencl::copied<float>(state, square(500), "two");
+  const opencl::DeviceArray<float> of_one(state, 256, "out"), of_two(state, 256, "out"),
+      later(state, 256, "out");
+  {
+    Turn a = launcher(), b = launcher();
+    turn(a, of_one, one);
+    turn(b, of_two, two);
+    turn(a, later, one);
+    BOOST_TEST(is_turned(of_one, 0));
+    BOOST_TEST(is_turned(of_two, 500));
+    BOOST_TEST(is_turned(later, 0));
+  }
+  Turn again = launcher();  // one of those
+  turn(again, later, two);
+  BOOST_TEST(is_turned(later, 500));
 }
 
 }  // namespace

@@ -153,6 +153,11 @@ void BufferPool::clear() {
   bytes_ = 0;
 }
 
+State::~State() {
+  // Kernels may still run, and writes read what is staged.
+  if (queue() != nullptr) clFinish(queue());
+}
+
 cl::Buffer State::allocate(std::uint64_t bytes, const std::string& what) {
   if (bytes > info.max_allocation) {
     throw ResourceError(fmt::format(

@@ -86,6 +86,23 @@ const cl::Program& program(State& state, const std::string& name, const Defines&
   return state.programs_.emplace(cache_key, std::move(built)).first->second;
 }
 
+std::optional<ReadyKernel> KernelPool::take(const std::string& key) {
+  const std::lock_guard guard(lock_);
+  const auto found = idle_.find(key);
+  if (found == idle_.end() || found->second.empty()) return std::nullopt;
+  ReadyKernel out = std::move(found->second.back());
+  found->second.pop_back();
+  return out;
+}
+
+void KernelPool::keep(const std::string& key, ReadyKernel kernel) noexcept {
+  try {
+    const std::lock_guard guard(lock_);
+    idle_[key].push_back(std::move(kernel));
+  } catch (...) {  // no memory for its entry: the next launcher makes one
+  }
+}
+
 std::string code_name(int code) {
 #define VDVR_CODE(name) \
   case name:            \

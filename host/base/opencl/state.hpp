@@ -4,12 +4,14 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -74,6 +76,45 @@ class BufferPool {
 /// kernel).
 using Defines = std::vector<std::pair<std::string, std::string>>;
 
+/// A kernel with its arguments, of one launcher at a time.
+struct ReadyKernel {
+  cl::Kernel kernel;
+  std::uint64_t largest_group = 1;
+  Pace* pace = nullptr;  // the state's
+};
+
+/// Kernels that launchers are done with, for the next one: drivers of GPUs take long to make them.
+class KernelPool {
+ public:
+  std::optional<ReadyKernel> take(const std::string& key);
+  void keep(const std::string& key, ReadyKernel kernel) noexcept;
+
+ private:
+  std::mutex lock_;
+  std::map<std::string, std::vector<ReadyKernel>> idle_;  // by program, kernel and defines
+};
+
+/// Copies of small arrays until the device has read them, page by page: an event of each write, and a thread
+/// of the driver that is told of it, would cost more than the write.
+class Staging {
+ public:
+  /// Enqueues a write of a copy of `bytes`. Throws cl::Error.
+  void write(cl::CommandQueue& queue, const cl::Buffer& to, const void* bytes, std::size_t size);
+
+ private:
+  struct Page {
+    std::unique_ptr<std::byte[]> bytes;
+    std::size_t size = 0, used = 0;
+    cl::Event read;  // once the page is full: when the last of its writes is over
+  };
+  Page page_for(std::size_t size);
+
+  std::mutex lock_;
+  Page filling_;
+  std::deque<Page> full_;  // as they were filled
+  std::size_t full_bytes_ = 0;
+};
+
 /// A launch that nobody waited for yet.
 struct Launched {
   cl::Event event;
@@ -85,11 +126,16 @@ struct Launched {
 
 /// Shared by the Device and by what may outlive it.
 struct State : std::enable_shared_from_this<State> {
+  ~State();  // waits for what is enqueued
+
   DeviceInfo info;
   cl::Device device;
   cl::Context context;
   cl::CommandQueue queue;
   MemoryAccount memory;
+  Staging staging;
+  /// Shared with launchers, which may outlive the state.
+  std::shared_ptr<KernelPool> kernels = std::make_shared<KernelPool>();
 
   /// An allocation of `bytes`, from the pool or new, counted. Throws ResourceError before anything is
   /// allocated.

@@ -143,6 +143,28 @@ void LatticeFit::fit(const opencl::DeviceArray<float>& gold, const opencl::Devic
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, VdvrGoldBlocks,
                  VdvrLattice, cl_float>
       err(state_, "certify/gold/fit_coefficients", "lattice_errors", defines_);
+  const std::uint64_t runs = count(b.gold_stride / opencl::lanes_of(state_.info, 16));
+  err(opencl::in_groups(state_.info, {runs, count(nodes_.count), 1}, {1, 16, 1}), errors_.buffer(),
+      level_.along.buffer(), gold.buffer(), margin.buffer(), nodes_.on_device.buffer(), to_int(nodes_.count),
+      blocks, l, curvature);
+  pool_and_shift(margin);
+  std::swap(level_.samples, before_);
+}
+
+void LatticeFit::pool_and_shift(const opencl::DeviceArray<float>& margin) {
+  const GoldBlocks& b = blocks_;
+  const VdvrLattice& l = level_.shape;
+  const VdvrGoldBlocks blocks = blocks_on_device();
+  const cl_int columns = to_int(samples_.count);
+  if (samples_each() == l.cz) {
+    opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer,
+                   cl::Buffer, cl::Buffer, cl_int, VdvrGoldBlocks, VdvrLattice, cl_float>
+        both(state_, "certify/gold/fit_coefficients", "pool_and_shift", defines_);
+    both(parts_of_columns(), level_.along.buffer(), before_.buffer(), level_.samples.buffer(), low_.buffer(),
+         high_.buffer(), errors_.buffer(), margin.buffer(), wanted_.buffer(), samples_.on_device.buffer(),
+         columns, blocks, l, share);
+    return;
+  }
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int,
                  VdvrGoldBlocks, VdvrLattice>
       pool(state_, "certify/gold/fit_coefficients", "pool_errors", defines_);
@@ -150,16 +172,11 @@ void LatticeFit::fit(const opencl::DeviceArray<float>& gold, const opencl::Devic
                  VdvrGoldBlocks, VdvrLattice, cl_float>
       shift(state_, "certify/gold/fit_coefficients", "shift_lattice", defines_);
   const std::uint64_t runs = count(b.gold_stride / opencl::lanes_of(state_.info, 16));
-  err(opencl::in_groups(state_.info, {runs, count(nodes_.count), 1}, {1, 16, 1}), errors_.buffer(),
-      level_.along.buffer(), gold.buffer(), margin.buffer(), nodes_.on_device.buffer(), to_int(nodes_.count),
-      blocks, l, curvature);
   pool(opencl::in_groups(state_.info, {runs, count(samples_.count), 1}, {1, 16, 1}), low_.buffer(),
        high_.buffer(), errors_.buffer(), margin.buffer(), wanted_.buffer(), samples_.on_device.buffer(),
-       to_int(samples_.count), blocks, l);
+       columns, blocks, l);
   shift(parts_of_columns(), level_.along.buffer(), before_.buffer(), level_.samples.buffer(), low_.buffer(),
-        high_.buffer(), samples_.on_device.buffer(), to_int(samples_.count), samples_each(), blocks, l,
-        share);
-  std::swap(level_.samples, before_);
+        high_.buffer(), samples_.on_device.buffer(), columns, samples_each(), blocks, l, share);
 }
 
 // On a CPU a work-item walks along a column, on a GPU it does a sample of it.

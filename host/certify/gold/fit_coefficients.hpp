@@ -63,6 +63,7 @@ class LatticeFit {
   void mark(const std::vector<NodeBox>& wanted, int steps);
   void reserve(std::uint64_t gold, int steps);
   void fit(const opencl::DeviceArray<float>& gold, const opencl::DeviceArray<float>& margin, float curvature);
+  void pool_and_shift(const opencl::DeviceArray<float>& margin);
   void fit_at_twice(const opencl::DeviceArray<float>& gold, const opencl::DeviceArray<float>& margin,
                     int steps, float curvature);
   [[nodiscard]] cl_int samples_each() const;

@@ -285,7 +285,7 @@ std::int64_t GoldStream::begin_batch(Batch& batch, const Work& work, const SlabS
   // Blocks that go together are told of, launched and asked for together; what fits them takes as much again.
   // A CPU has them in its caches; a card runs dry between small launches.
   const auto left = static_cast<std::int64_t>(state_.memory.left());
-  const std::int64_t large = std::int64_t{256} << (state_.info.is_cpu ? 20 : 23),
+  const std::int64_t large = std::int64_t{256} << (state_.info.is_cpu ? 20 : 25),
                      wanted = std::max(std::min<std::int64_t>(64 << 20, left / 3), std::min(large, left / 8)),
                      bytes = std::min(wanted, static_cast<std::int64_t>(state_.info.max_allocation)),
                      together = std::clamp<std::int64_t>(bytes / per_block, 1,

@@ -295,15 +295,16 @@ void BrickRemainder::look_at(const Index3& first, const Index3& bricks) {
   opencl::DeviceArray<float> gold(state_, count(box.nodes[0] * box.nodes[1] * stride), "gold of bricks");
   gold.fill(0.0f);
   kept_.fill(nodes_, box, gold, 0, stride);
-  std::vector<float> margins;
-  for (std::int64_t y = 0; y < box.nodes[1]; ++y)
+  std::vector<float> margins(at(box.nodes[0] * box.nodes[1]));
+  const auto place = [&](std::int64_t node, std::size_t a) {
+    return grid_.origin[a] +
+           static_cast<double>(box.first[a] + node) * grid_.spacing[a] / static_cast<double>(rates_[a]);
+  };
+  parallel_for(box.nodes[1], {}, "", [&](std::int64_t y) {
     for (std::int64_t x = 0; x < box.nodes[0]; ++x)
-      margins.push_back(static_cast<float>(
-          coverage_.margin_above(grid_.origin[0] + static_cast<double>(box.first[0] + x) * grid_.spacing[0] /
-                                                       static_cast<double>(rates_[0]),
-                                 grid_.origin[1] + static_cast<double>(box.first[1] + y) * grid_.spacing[1] /
-                                                       static_cast<double>(rates_[1]),
-                                 2 * lowest_)));
+      margins[at(y * box.nodes[0] + x)] =
+          static_cast<float>(coverage_.margin_above(place(x, 0), place(y, 1), 2 * lowest_));
+  });
   const auto margin = opencl::copied<float>(state_, margins, "coverage margins");
   const opencl::DeviceArray<float> out(state_, count(bricks[0] * bricks[1] * bricks[2] * 6),
                                        "fourth differences");

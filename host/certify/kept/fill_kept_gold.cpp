@@ -14,9 +14,12 @@ namespace {
 // Of the heights made of them, in bytes: less is made that nobody asks for, but each page that a box reads is
 // a launch. The larger one only as far as it is a small part of the memory that is left, and no more than
 // all.
-constexpr std::uint64_t least_run_page = std::uint64_t{8} << 20, most_run_page = std::uint64_t{64} << 20;
-// Floats on the way from heights to gold: boxes that fit are made together, and stay in caches.
-constexpr std::uint64_t floats_together = std::uint64_t{1} << 22;
+constexpr std::uint64_t least_run_page = std::uint64_t{8} << 20, most_run_page = std::uint64_t{256} << 20,
+                        most_run_page_of_card = std::uint64_t{1} << 30;
+// Floats on the way from heights to gold: boxes that fit are made together. On a CPU they stay in caches; a
+// card runs dry between small launches.
+constexpr std::uint64_t floats_together = std::uint64_t{1} << 23,
+                        most_floats_of_card = std::uint64_t{1} << 28;
 
 }  // namespace
 
@@ -69,7 +72,8 @@ void KeptGold::begin_run(std::int64_t low, std::int64_t heights) {
       height_weights(rows_of(static_cast<double>(run.low), 1.0, run.count), run.count, scan_.geometry.rows);
   run.stride = column_stride(run.count);
   const std::uint64_t a_tile = 4 * count(side * side * run.stride),
-                      page = std::clamp(state_.memory.left() / 16, least_run_page, most_run_page);
+                      page = std::clamp(state_.memory.left() / 16, least_run_page,
+                                        state_.info.is_cpu ? most_run_page : most_run_page_of_card);
   run.a_page = scratch() ? page_bytes / a_tile : std::min<std::size_t>(page / a_tile, tiles_.size());
   run.a_page = std::max<std::size_t>(1, run.a_page);
   run.from_rows.emplace(state_, weights);
@@ -92,18 +96,23 @@ KeptGold::Place KeptGold::heights_of(const TileAt& tile, const Place& place) {
   }
   const Place out{run_->pages.size() - 1, run_->of_last++ * size};
   run_->tiles.emplace(tile, out);
-  make_heights(place, out);
+  want_heights(place, out);
   return out;
 }
 
-void KeptGold::make_heights(const Place& place, const Place& out) {
+void KeptGold::want_heights(const Place& rows, const Place& heights) {
+  run_->to_make[{rows.page, heights.page}].push_back({rows.first, heights.first, to_int(side), to_int(side)});
+}
+
+void KeptGold::make_heights() {
   VdvrAlongZ shape{};
   shape.in_x = count(stride_);
   shape.in_y = count(side * stride_);
   shape.out_x = count(run_->stride);
   shape.out_y = count(side * run_->stride);
-  const VdvrColumns part{place.first, out.first, to_int(side), to_int(side)};
-  (*run_->from_rows)(state_, pages_[place.page], run_->pages[out.page], std::span(&part, 1), shape);
+  for (const auto& [pages, parts] : run_->to_make)
+    (*run_->from_rows)(state_, pages_[pages[0]], run_->pages[pages[1]], parts, shape);
+  run_->to_make.clear();
 }
 
 // Of all rows where they are few, else of heights at half a pixel.
@@ -177,6 +186,7 @@ void KeptGold::take_heights(const GoldLattice& lattice, std::span<const GoldBox>
   std::uint64_t first = 0;
   VdvrAlongZ shape{};
   const auto resample = [&] {
+    if (!few_rows()) make_heights();
     for (const auto& [page, parts] : by_page)
       (*heights_->weights)(state_, few_rows() ? pages_[page] : run_->pages[page], out, parts, shape);
     by_page.clear();
@@ -223,7 +233,11 @@ void KeptGold::fill(const GoldLattice& lattice, std::span<const GoldBox> boxes,
       throw std::logic_error("KeptGold: boxes that differ");
   resample_heights(lattice, one);
   const std::uint64_t largest = count(x.count * std::max(y.count, one.nodes[1]) * heights_->padded);
-  const std::size_t together = std::max<std::size_t>(1, floats_together / largest);
+  // A twelfth of what is left each, of the two arrays that are made.
+  const std::uint64_t floats =
+      state_.info.is_cpu ? floats_together
+                         : std::clamp(state_.memory.left() / 48, floats_together, most_floats_of_card);
+  const std::size_t together = std::max<std::size_t>(1, floats / largest);
   for (std::size_t i = 0; i < boxes.size(); i += together)
     fill_together(lattice, boxes.subspan(i, std::min(together, boxes.size() - i)), out, first + i * apart,
                   apart, stride);

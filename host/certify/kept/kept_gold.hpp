@@ -179,7 +179,8 @@ class KeptGold {
   void resample_heights(const GoldLattice& lattice, const GoldBox& box);
   void require_run(const Span& z);
   Place heights_of(const TileAt& tile, const Place& place);
-  void make_heights(const Place& rows, const Place& heights);
+  void want_heights(const Place& rows, const Place& heights);
+  void make_heights();  // those that are wanted
   void take_heights(const GoldLattice& lattice, std::span<const GoldBox> boxes,
                     const opencl::DeviceArray<float>& out);
   void fill_together(const GoldLattice& lattice, std::span<const GoldBox> boxes,
@@ -233,6 +234,7 @@ class KeptGold {
     std::size_t a_page = 1, of_last = 0;            // and how many that has
     bool common = false;
     std::map<TileAt, Place> tiles;
+    std::map<std::array<std::size_t, 2>, std::vector<VdvrColumns>> to_make;  // by pages of rows and heights
   };
   std::optional<Run> run_;  // of cone beam the kept nodes themselves, never made again
   std::optional<ConeTiles> cone_;

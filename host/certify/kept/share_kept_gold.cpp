@@ -128,7 +128,8 @@ void KeptGold::make_common_heights(const Progress& progress) {
   common_->make_heights(
       [&](std::size_t i) {
         const TileAt& tile = all[common.order()[i]];
-        make_heights(tiles_.at(tile), run.tiles.at(tile));
+        want_heights(tiles_.at(tile), run.tiles.at(tile));
+        make_heights();
         state_.queue.finish();
       },
       progress);

@@ -73,6 +73,38 @@ __kernel void take_lattice(__global float* along, __global float* lattice, __glo
   INTERPOLATE(OF_GOLD)
 }
 
+// Smallest and largest error over the gold columns within half a spacing of a lattice column, at
+// VDVR_LANES gold nodes along z. Lattice columns on the rim have a cell on one side only, which has to do.
+static inline void pool(__global float* low, __global float* high, __global const float* errors,
+                        __global const float* margin, __global const uint* wanted, VdvrMarkedColumn at, int z,
+                        VdvrGoldBlocks g, VdvrLattice l) {
+  if (!has_run(at.runs, z)) return;
+  const size_t of_lattice = ((size_t)at.block * l.cy + at.y) * l.cx + at.x;
+  VEC smallest = (VEC)(INFINITY), largest = (VEC)(-INFINITY);
+  const int x0 = at.x > 0 ? -(l.spacing_x / 2) : 0, x1 = at.x + 1 < l.cx ? l.spacing_x / 2 : 0;
+  const int y0 = at.y > 0 ? -(l.spacing_y / 2) : 0, y1 = at.y + 1 < l.cy ? l.spacing_y / 2 : 0;
+  for (int dy = y0; dy <= y1; ++dy)
+    for (int dx = x0; dx <= x1; ++dx) {
+      const int gx = (at.x - l.reach_x) * l.spacing_x + g.halo + dx,
+                gy = (at.y - l.reach_y) * l.spacing_y + g.halo + dy;
+      const size_t column = ((size_t)at.block * (g.ny + 2 * g.halo) + gy) * (g.nx + 2 * g.halo) + gx;
+      if (margin[column] < g.lowest || !has_run(wanted[column], z)) continue;
+      const VEC e = READ(errors + column * g.gold_stride + z);
+      smallest = fmin(smallest, e);
+      largest = fmax(largest, e);
+    }
+  WRITE(smallest, low + of_lattice * g.gold_stride + z);
+  WRITE(largest, high + of_lattice * g.gold_stride + z);
+}
+__kernel void pool_errors(__global float* low, __global float* high, __global const float* errors,
+                          __global const float* margin, __global const uint* wanted,
+                          __global const VdvrMarkedColumn* columns, int count, VdvrGoldBlocks g,
+                          VdvrLattice l) {
+  const int z = (int)get_global_id(0) * VDVR_LANES, i = (int)get_global_id(1);
+  if (z + VDVR_LANES > g.gold_stride || i >= count) return;
+  pool(low, high, errors, margin, wanted, columns[i], z, g, l);
+}
+
 // One step of the fit, interpolated. Gold nodes outside [z_first, z_last] do not count, nor those beyond the
 // lattice.
 static inline float shifted(int k, __global const float* before, __global const float* low,
@@ -98,6 +130,22 @@ __kernel void shift_lattice(__global float* along, __global float* after, __glob
                        *most = high + p.column * g.gold_stride;
   __global float* samples = after + p.column * l.cz;
 #define SHIFTED(k) shifted(k, from, least, most, g, l, share)
+  INTERPOLATE(SHIFTED)
+}
+// Both, where a work-item does a whole column, which needs nobody else's errors: half as many launches.
+__kernel void pool_and_shift(__global float* along, __global float* after, __global const float* before,
+                             __global float* low, __global float* high, __global const float* errors,
+                             __global const float* margin, __global const uint* wanted,
+                             __global const VdvrMarkedColumn* columns, int count, VdvrGoldBlocks g,
+                             VdvrLattice l, float share) {
+  Part p;
+  if (!find_part(&p, columns, count, l.cz, l)) return;
+  const VdvrMarkedColumn at = columns[get_global_id(1)];
+  for (int z = 0; z + VDVR_LANES <= g.gold_stride; z += VDVR_LANES)
+    pool(low, high, errors, margin, wanted, at, z, g, l);
+  __global const float *from = before + p.column * l.cz, *least = low + p.column * g.gold_stride,
+                       *most = high + p.column * g.gold_stride;
+  __global float* samples = after + p.column * l.cz;
   INTERPOLATE(SHIFTED)
 }
 #undef KEEP
@@ -150,31 +198,4 @@ __kernel void lattice_errors(__global float* errors, __global const float* along
                     fy * fma(before, READ(b), fx * READ(b + g.gold_stride))) -
                 target;
   WRITE(e, errors + column * g.gold_stride + z);
-}
-
-// Smallest and largest error over the gold columns within half a spacing of a lattice column, at
-// VDVR_LANES gold nodes along z. Lattice columns on the rim have a cell on one side only, which has to do.
-__kernel void pool_errors(__global float* low, __global float* high, __global const float* errors,
-                          __global const float* margin, __global const uint* wanted,
-                          __global const VdvrMarkedColumn* columns, int count, VdvrGoldBlocks g,
-                          VdvrLattice l) {
-  const int z = (int)get_global_id(0) * VDVR_LANES, i = (int)get_global_id(1);
-  if (z + VDVR_LANES > g.gold_stride || i >= count || !has_run(columns[i].runs, z)) return;
-  const int x = columns[i].x, y = columns[i].y, block = columns[i].block;
-  const size_t of_lattice = ((size_t)block * l.cy + y) * l.cx + x;
-  VEC smallest = (VEC)(INFINITY), largest = (VEC)(-INFINITY);
-  const int x0 = x > 0 ? -(l.spacing_x / 2) : 0, x1 = x + 1 < l.cx ? l.spacing_x / 2 : 0;
-  const int y0 = y > 0 ? -(l.spacing_y / 2) : 0, y1 = y + 1 < l.cy ? l.spacing_y / 2 : 0;
-  for (int dy = y0; dy <= y1; ++dy)
-    for (int dx = x0; dx <= x1; ++dx) {
-      const int gx = (x - l.reach_x) * l.spacing_x + g.halo + dx,
-                gy = (y - l.reach_y) * l.spacing_y + g.halo + dy;
-      const size_t column = ((size_t)block * (g.ny + 2 * g.halo) + gy) * (g.nx + 2 * g.halo) + gx;
-      if (margin[column] < g.lowest || !has_run(wanted[column], z)) continue;
-      const VEC e = READ(errors + column * g.gold_stride + z);
-      smallest = fmin(smallest, e);
-      largest = fmax(largest, e);
-    }
-  WRITE(smallest, low + of_lattice * g.gold_stride + z);
-  WRITE(largest, high + of_lattice * g.gold_stride + z);
 }
