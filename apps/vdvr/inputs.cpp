@@ -211,8 +211,10 @@ ProjectionSet load_as_stated(const fs::path& path, const Arguments& args, const 
                             geometry && geometry->cone && bare ? std::optional(Beam::cone) : std::nullopt,
                             stored, progress, understood);
   if (understood.stated != stored)
-    throw MismatchError(fmt::format("{}: options state of the input: {}; the volume was built with: {}",
-                                    path.string(), text_of(understood.stated), text_of(stored)));
+    throw MismatchError(
+        fmt::format("{}: options state of the input: {}; the volume was built with: {}", path.string(),
+                    text_of(understood.stated),
+                    stored == InputStatement{} ? "what the file itself says" : text_of(stored)));
   return scan;
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <stdexcept>
 #include <vector>
 
 namespace vdvr {
@@ -43,13 +44,32 @@ void add_vertices(std::size_t steps, HalfSteps& s, std::size_t corner, std::vect
   for (s[corner] = from; s[corner] <= to; ++s[corner]) add_vertices(steps, s, corner + 1, out);
 }
 
-std::array<std::vector<HalfSteps>, 8> all_vertices() {
-  std::array<std::vector<HalfSteps>, 8> all;
+// Corner by corner, the samples of all vertices: sums over corners are taken of all at once.
+struct Vertices {
+  static constexpr std::size_t most = 128;
+  std::size_t count = 0;
+  std::array<std::array<double, most>, 8> samples{};
+};
+
+std::array<Vertices, 8> all_vertices() {
+  std::array<Vertices, 8> all;
   for (std::size_t steps = 1; steps < 8; ++steps) {
     HalfSteps s{};
-    add_vertices(steps, s, 1, all[steps]);
+    std::vector<HalfSteps> found;
+    add_vertices(steps, s, 1, found);
+    if (found.size() > Vertices::most) throw std::logic_error("corner_weights: more vertices than foreseen");
+    all[steps].count = found.size();
+    for (std::size_t n = 0; n < found.size(); ++n)
+      for (std::size_t c = 0; c < 8; ++c) all[steps].samples[c][n] = 0.5 * found[n][c];
   }
   return all;
+}
+
+double largest_sum(const Corners& off, const Vertices& vertices) {
+  std::array<double, Vertices::most> sums{};
+  for (std::size_t c = 0; c < 8; ++c)
+    for (std::size_t n = 0; n < Vertices::most; ++n) sums[n] += off[c] * vertices.samples[c][n];
+  return *std::max_element(sums.begin(), sums.begin() + static_cast<std::ptrdiff_t>(vertices.count));
 }
 
 }  // namespace
@@ -70,18 +90,14 @@ double sum_of_steps(std::size_t steps) {
 }
 
 void raise_to_error(BySteps& largest, const Corners& off) {
-  static const std::array<std::vector<HalfSteps>, 8> vertices = all_vertices();
+  static const std::array<Vertices, 8> vertices = all_vertices();
   double moved = 0;
   for (const double d : off) moved += 0.5 * std::abs(d);
   for (std::size_t steps = 1; steps < 8; ++steps) {
     // No two samples of the cell differ by more than the sum of the steps.
     if (moved * sum_of_steps(steps) <= largest[steps]) continue;
     if (!std::isfinite(moved)) largest[steps] = std::numeric_limits<double>::infinity();
-    for (const HalfSteps& s : vertices[steps]) {
-      double error = 0;
-      for (std::size_t c = 0; c < 8; ++c) error += off[c] * 0.5 * s[c];
-      largest[steps] = std::max(largest[steps], error);
-    }
+    largest[steps] = std::max(largest[steps], largest_sum(off, vertices[steps]));
   }
 }
 
