@@ -4,19 +4,15 @@
 //   VDVR_REPLAY_FILE=FILE   what is read
 //   VDVR_REPLAY=1           play it; else keep it
 #include <CL/cl.h>
-#include <dlfcn.h>
 
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <mutex>
 
-namespace {
+#include "tests/support/next_function.hpp"
 
-template <class Function>
-Function next(const char* name) {
-  return reinterpret_cast<Function>(dlsym(RTLD_NEXT, name));
-}
+namespace {
 
 class Tape {
  public:

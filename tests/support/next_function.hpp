@@ -1,4 +1,5 @@
-// The function behind a preloaded one of the same name. Used by the layers that tests preload.
+// The function behind a preloaded one of the same name. Used by the layers that tests and
+// bench/host_stages preload.
 #pragma once
 
 #include <dlfcn.h>
