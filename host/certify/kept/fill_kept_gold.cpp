@@ -72,8 +72,9 @@ void KeptGold::begin_run(std::int64_t low, std::int64_t heights) {
       height_weights(rows_of(static_cast<double>(run.low), 1.0, run.count), run.count, scan_.geometry.rows);
   run.stride = column_stride(run.count);
   const std::uint64_t a_tile = 4 * count(side * side * run.stride),
-                      page = std::clamp(state_.memory.left() / 16, least_run_page,
-                                        state_.info.is_cpu ? most_run_page : most_run_page_of_card);
+                      most = std::min(state_.info.is_cpu ? most_run_page : most_run_page_of_card,
+                                      state_.info.max_allocation),
+                      page = std::clamp(state_.memory.left() / 16, std::min(least_run_page, most), most);
   run.a_page = scratch() ? page_bytes / a_tile : std::min<std::size_t>(page / a_tile, tiles_.size());
   run.a_page = std::max<std::size_t>(1, run.a_page);
   run.from_rows.emplace(state_, weights);
@@ -237,7 +238,8 @@ void KeptGold::fill(const GoldLattice& lattice, std::span<const GoldBox> boxes,
   const std::uint64_t floats =
       state_.info.is_cpu ? floats_together
                          : std::clamp(state_.memory.left() / 48, floats_together, most_floats_of_card);
-  const std::size_t together = std::max<std::size_t>(1, floats / largest);
+  const std::size_t together =
+      std::max<std::size_t>(1, std::min(floats, state_.info.max_allocation / 4) / largest);
   for (std::size_t i = 0; i < boxes.size(); i += together)
     fill_together(lattice, boxes.subspan(i, std::min(together, boxes.size() - i)), out, first + i * apart,
                   apart, stride);
