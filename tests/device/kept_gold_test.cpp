@@ -260,6 +260,24 @@ BOOST_AUTO_TEST_CASE(a_block_computed_alone_is_the_block_in_the_whole) {
 }
 
 // The same bits, however often their pages are let go.
+// OpenCL promises no more than an eighth of a gigabyte in one buffer, which heights of many tiles would pass.
+BOOST_AUTO_TEST_CASE(heights_lie_in_buffers_that_the_device_allows) {
+  const ProjectionSet scan = noise_scan(11, 40, 40, 3);
+  Chain chain(scan);
+  const Grid grid = grid_in({20, 20, 6}, {1, 1, 1}, {-10, -10, -3});
+  KeptGold kept(device().state(), chain.filtered, chain.sups, grid, 1, 8, Interpolation::six_taps),
+      in_parts(device().state(), chain.filtered, chain.sups, grid, 1, 8, Interpolation::six_taps);
+  const GoldLattice lattice = kept.lattice(grid, 2);
+  const Nodes at_once = nodes_of(kept, lattice, whole(grid, 2, 2));
+  in_parts.prepare(lattice, {whole(grid, 2, 2)}, {});
+  struct Limit {
+    std::uint64_t& most = device().state().info.max_allocation;
+    const std::uint64_t before = std::exchange(most, std::uint64_t{1} << 20);
+    ~Limit() { most = before; }
+  } limit;
+  BOOST_TEST((nodes_of(in_parts, lattice, whole(grid, 2, 2)).values == at_once.values));
+}
+
 BOOST_AUTO_TEST_CASE(gold_kept_in_scratch_is_that_kept_in_memory) {
   if (device().state().info.is_gpu) return;
   for (const std::int64_t rows : {9, 40}) {
