@@ -40,6 +40,7 @@ const std::set<std::string>& fields_with_options() {
                                            "gradient",
                                            "granularity",
                                            "half_acquisition",
+                                           "heights",
                                            "iso",
                                            "levels",
                                            "light",

@@ -230,7 +230,7 @@ ProjectionSet load_scan_to_verify(const fs::path& path, const Arguments& args, c
   FieldOptions measured = certificate.field;
   measured.preparation.half_acquisition = false;
   measured.preparation.padding = Padding::none;
-  measured.preparation.common_heights = false;
+  measured.preparation.heights = Heights::as_seen;
   return checked(
       rows_to_verify(load_as_stated(path, args, certificate, measured, progress), certificate.field), path);
 }

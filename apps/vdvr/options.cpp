@@ -59,15 +59,19 @@ void add_field(Arguments& args) {
       .value("half-acquisition", "auto|on|off",
              "a full turn about an axis off the middle: opposite views are rows of a wider detector (default "
              "auto: as axis and arc say)")
+      .value("heights", "auto|common|all",
+             "of views that saw the sample at other heights: those that all see, or all that are seen from "
+             "every "
+             "direction (default auto: all where views share fewer than half of their rows)")
       .value("pad", "none|edge|mirror",
              "of objects wider than the detector: how rows go on beyond it, tapering to zero (default none)");
 }
 
 namespace {
 
-const std::vector<std::string> preparation_names{"outliers",         "phase",    "stripes",
-                                                 "median",           "gaussian", "binning",
-                                                 "half-acquisition", "pad",      "flats-in-time"};
+const std::vector<std::string> preparation_names{"outliers",      "phase",   "stripes",          "median",
+                                                 "gaussian",      "binning", "half-acquisition", "pad",
+                                                 "flats-in-time", "heights"};
 
 // `count` numbers, or the first alone where `fewest` is 1.
 std::vector<double> list_of(const Arguments& args, const std::string& name, std::size_t fewest,
@@ -116,6 +120,8 @@ Preparation preparation_options(const Arguments& args) {
   const std::string half = args.choice("half-acquisition", "auto");
   if (half != "auto") p.half_acquisition = half == "on";
   p.padding = padding_of(args.choice("pad", "none")).value();
+  if (const std::string heights = args.choice("heights", "auto"); heights != "auto")
+    p.heights = heights_of(heights).value();
   const std::string flats = args.choice("flats-in-time", "auto");
   if (flats != "auto") p.flats_in_time = flats == "on";
   check_preparation(p);

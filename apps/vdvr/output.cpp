@@ -42,6 +42,8 @@ Json geometry_json(const ParallelGeometry& rows) {
             {"pitch_u", g.pitch_u}, {"pitch_v", g.pitch_v}, {"center", stated_center({}, rows)},
             {"unit", g.unit}};
   if (g.axis_roll_deg != 0) j["axis_roll"] = g.axis_roll_deg;
+  if (!g.series.none())
+    j["series"] = {{"views", g.series.theta_rad.size()}, {"rows", g.series.rows}, {"first", g.series.first}};
   if (g.extension.cut > 0) j["columns_cut"] = g.extension.cut;
   if (rows.extension.before > 0 || rows.extension.after > 0)
     j["longer_rows"] = {{"half_acquisition", rows.extension.half_acquisition.value_or(false)},

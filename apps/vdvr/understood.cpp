@@ -81,17 +81,22 @@ std::vector<Assumption> assumed(const ProjectionSet& scan, const Understood& r) 
   return all;
 }
 
+// By view of the files.
+const std::vector<double>& measured_angles(const ParallelGeometry& g) {
+  return g.series.none() ? g.theta_rad : g.series.theta_rad;
+}
+
 }  // namespace
 
 Json understood_json(const ProjectionSet& scan, const Understood& r) {
-  const Turn t = turn_of(scan.geometry.theta_rad);
+  const std::vector<double>& theta = measured_angles(scan.geometry);
+  const Turn t = turn_of(theta);
   Json frames = Json::array(), assumptions = Json::array();
   for (const NamedView& f : r.frames)
-    frames.push_back(
-        {{"view", f.view},
-         {"projection", f.projection},
-         {"name", f.name},
-         {"angle_deg", scan.geometry.theta_rad.at(static_cast<std::size_t>(f.view)) * degrees_per_radian}});
+    frames.push_back({{"view", f.view},
+                      {"projection", f.projection},
+                      {"name", f.name},
+                      {"angle_deg", theta.at(static_cast<std::size_t>(f.view)) * degrees_per_radian}});
   for (const Assumption& a : assumed(scan, r))
     assumptions.push_back({{"what", a.what}, {"why", a.why}, {"otherwise", with_options(a.otherwise)}});
   return {{"values", text_of(r.values)},
@@ -115,17 +120,17 @@ Json understood_json(const ProjectionSet& scan, const Understood& r) {
 namespace {
 
 void print_understood(const ProjectionSet& scan, const Understood& r) {
-  const ParallelGeometry& g = scan.geometry;
+  const std::vector<double>& theta = measured_angles(scan.geometry);
   for (const std::string& warning : r.warnings) fmt::print("  WARNING      {}\n", with_options(warning));
   fmt::print("  values       {}\n", values_text(r));
   if (!r.stated.none()) fmt::print("  stated       {}\n", text_of(r.stated));
-  fmt::print("  arc          {}\n", arc_text(turn_of(g.theta_rad)));
+  fmt::print("  arc          {}\n", arc_text(turn_of(theta)));
   for (const NamedView& f : r.frames)
     fmt::print("  {:<12} {:.6g} degrees: {}\n",
-               f.view == 0                    ? "first view"
-               : f.view == 1 && g.views() > 2 ? "second view"
-                                              : "last view",
-               g.theta_rad[static_cast<std::size_t>(f.view)] * degrees_per_radian, f.name);
+               f.view == 0                       ? "first view"
+               : f.view == 1 && theta.size() > 2 ? "second view"
+                                                 : "last view",
+               theta[static_cast<std::size_t>(f.view)] * degrees_per_radian, f.name);
   for (const Assumption& a : assumed(scan, r))
     fmt::print("  assumed      {}: {}; {} say otherwise\n", a.what, a.why, with_options(a.otherwise));
 }
@@ -162,6 +167,9 @@ void print_scan(const ProjectionSet& scan, const Understood* understood) {
   fmt::print("  centre       column {:.4f} ({})\n", stated_center({}, scan.geometry), r.center_source);
   if (g.axis_roll_deg != 0)
     fmt::print("  axis roll    {:g} degrees in the detector's plane\n", g.axis_roll_deg);
+  if (const HeightSeries& s = g.series; !s.none())
+    fmt::print("  heights      all that are seen from every direction, of {} views of {} rows\n",
+               s.theta_rad.size(), s.rows);
   if (const RowExtension& e = scan.geometry.extension; e.before > 0 || e.after > 0)
     fmt::print("  rows         longer: {} columns before, {} after, for {}\n", e.before, e.after,
                text_of(extended_by(e)));

@@ -33,6 +33,7 @@ std::string plan_digest(const ProjectionSet& scan, const Plan& plan) {
   update(sha, scan.geometry.theta_rad);
   update(sha, scan.geometry.column_shift);
   update(sha, scan.geometry.row_shift);
+  update(sha, scan.geometry.series.row_shift);
   sha.update(&scan.geometry.axis_roll_deg, sizeof(double));
   if (scan.cone) update(sha, scan.cone->views);
   update(sha, plan.base.samples);

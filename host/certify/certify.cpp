@@ -89,6 +89,14 @@ std::string options_json(const Plan& plan, const CertifyOptions& options, const 
                    {"theta_rad", geometry.theta_rad}};
   if (!geometry.column_shift.empty()) j["geometry"]["column_shift"] = geometry.column_shift;
   if (!geometry.row_shift.empty()) j["geometry"]["row_shift"] = geometry.row_shift;
+  if (const HeightSeries& s = geometry.series; !s.none()) {
+    j["geometry"]["series"] = {{"rows", s.rows},
+                               {"first", s.first},
+                               {"full_turn", s.full_turn},
+                               {"theta_rad", s.theta_rad},
+                               {"row_shift", s.row_shift}};
+    if (!s.column_shift.empty()) j["geometry"]["series"]["column_shift"] = s.column_shift;
+  }
   if (geometry.axis_roll_deg != 0) {
     j["geometry"]["axis_roll"] = geometry.axis_roll_deg;
     j["geometry"]["columns_cut"] = geometry.extension.cut;

@@ -22,7 +22,7 @@ constexpr std::int64_t looked_at = 16, frequencies = 512;
 
 struct Sums {
   double mean = 0, variance = 0;
-  std::vector<double> of_pixel;             ///< sum over views of the weights of a pixel's own samples
+  std::vector<double> of_pixel;             ///< of the detector: the sum of what its samples weigh
   std::array<double, most_lags + 1> lag{};  ///< of weights of rows so far apart
   double passed = 0, white = 0;             ///< power of weights with the noise's spectrum, and without
 };
@@ -58,7 +58,6 @@ class MeanSumsOfViews {
       : scan_(scan), weights_(weights), noise_(noise) {
     if (!noise.model) return;
     variance_.emplace(scan.geometry, *noise.model);
-    factors_ = row_factors(scan.geometry);
   }
 
   void add(std::int64_t k, std::vector<double>& weight, Sums& sums) const {
@@ -68,8 +67,11 @@ class MeanSumsOfViews {
     for (std::int64_t i = 0; i < pixels; ++i) sums.mean += weight[at(i)] * static_cast<double>(sample[i]);
     if (!variance_) return;
     for (std::int64_t i = 0; i < pixels; ++i) {
-      sums.variance += weight[at(i)] * weight[at(i)] * variance_->of_sample(i, sample[i]);
-      sums.of_pixel[at(i)] += weight[at(i)] * static_cast<double>(factors_[at(i % columns)]);
+      const double w = weight[at(i)];
+      sums.variance += w * w * variance_->of_sample(k, i, sample[i]);
+      variance_->for_each_pixel(k, i / columns, i % columns, [&](std::int64_t pixel, double factor) {
+        sums.of_pixel[at(pixel)] += w * factor;
+      });
     }
     if (!noise_.model->row_correlation.empty())
       for (std::int64_t lag = 0; lag <= most_lags; ++lag)
@@ -80,6 +82,8 @@ class MeanSumsOfViews {
       add_powers(weight, columns, noise_.model->spectrum, sums);
   }
 
+  [[nodiscard]] std::int64_t detector_pixels() const { return variance_ ? variance_->pixels() : 0; }
+
   // Of the noise that is common to all views. Where stripes were taken off, it went with them.
   [[nodiscard]] double of_flats(const Sums& sums) const {
     const LineIntegralNoise& model = *noise_.model;
@@ -87,14 +91,10 @@ class MeanSumsOfViews {
     LineIntegralNoise counted = model;
     counted.constant = 0;
     const SampleVariance of_flat(scan_.geometry, counted);
-    const std::int64_t columns = scan_.geometry.columns;
     double sum = 0;
-    for (std::int64_t i = 0; i < std::ssize(sums.of_pixel); ++i) {
-      const auto factor = static_cast<double>(factors_[at(i % columns)]);
-      // A flat's pixel counts what a view's does where the line integral is 0.
-      if (factor != 0)
-        sum += sums.of_pixel[at(i)] * sums.of_pixel[at(i)] * of_flat.of_sample(i, 0) / (factor * factor);
-    }
+    // A flat's pixel counts what a view's does where the line integral is 0.
+    for (std::int64_t i = 0; i < std::ssize(sums.of_pixel); ++i)
+      sum += sums.of_pixel[at(i)] * sums.of_pixel[at(i)] * of_flat.of_open_pixel(i);
     return sum / static_cast<double>(noise_.flats);
   }
 
@@ -112,7 +112,6 @@ class MeanSumsOfViews {
   const measured::MeanWeights& weights_;
   const MeanNoise& noise_;
   std::optional<SampleVariance> variance_;
-  std::vector<float> factors_;
 };
 
 }  // namespace
@@ -129,7 +128,7 @@ MeanOfScan mean_of_scan(const ProjectionSet& scan, const FieldOptions& field, co
   std::vector<Sums> sums(at(groups));
   parallel_for(groups, progress, "mean", [&](std::int64_t group) {
     std::vector<double> weight;
-    sums[at(group)].of_pixel.assign(at(noise.model ? pixels : 0), 0.0);
+    sums[at(group)].of_pixel.assign(at(views.detector_pixels()), 0.0);
     for (std::int64_t k = group * K / groups; k < (group + 1) * K / groups; ++k)
       views.add(k, weight, sums[at(group)]);
   });

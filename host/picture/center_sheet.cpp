@@ -11,6 +11,7 @@
 #include "host/picture/canvas.hpp"
 #include "host/picture/sheet.hpp"
 #include "host/picture/text.hpp"
+#include "host/scan/geometry/views_of_rows.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/extend_rows.hpp"
 #include "vdvr/expert/reconstruct.hpp"
@@ -25,9 +26,11 @@ using std::numbers::pi;
 // Of parallel beam one row. Of cone beam all: the views' weights and the slice's rows belong together.
 ProjectionSet row_of(const ProjectionSet& scan, std::int64_t row) {
   if (scan.cone) return scan;
+  if (auto seen = views_of_rows(scan, row, 1)) return *std::move(seen);
   ProjectionSet one;
   one.geometry = scan.geometry;
   one.geometry.rows = 1;
+  one.geometry.series = {};
   one.report = scan.report;
   const ParallelGeometry& g = scan.geometry;
   for (std::int64_t k = 0; k < g.views(); ++k)

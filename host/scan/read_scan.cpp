@@ -18,7 +18,7 @@
 #include "host/scan/motion.hpp"
 #include "host/scan/open/open_scan.hpp"
 #include "host/scan/photon_transfer.hpp"
-#include "host/scan/prepare/common_heights.hpp"
+#include "host/scan/prepare/heights.hpp"
 #include "host/scan/prepare/prepare.hpp"
 #include "host/scan/preprocess.hpp"
 #include "host/scan/scan_report.hpp"
@@ -263,10 +263,16 @@ void choose_center(const fs::path& path, const io::RawScan& raw, const ScanOptio
   require_on_detector(path, g.center, g.columns, options);
 }
 
-void extend(const fs::path& path, const io::RawScan& raw, const ScanOptions& options, ProjectionSet& scan,
-            Understood& understood) {
+// What is stated of half acquisition: by the options, else by the files.
+Preparation wanted_of(const io::RawScan& raw, const ScanOptions& options) {
   Preparation wanted = options.preparation;
   if (!wanted.half_acquisition && !raw.cone) wanted.half_acquisition = raw.half_acquisition;
+  return wanted;
+}
+
+void extend(const fs::path& path, const io::RawScan& raw, const ScanOptions& options, ProjectionSet& scan,
+            Understood& understood) {
+  const Preparation wanted = wanted_of(raw, options);
   try {
     const std::string recognised = extend_rows(scan, wanted, options.max_memory_bytes, options.scratch);
     if (recognised.empty()) return;
@@ -278,10 +284,10 @@ void extend(const fs::path& path, const io::RawScan& raw, const ScanOptions& opt
   }
 }
 
-void bring_to_common_heights(const fs::path& path, const io::RawScan& raw, const ScanOptions& options,
-                             ProjectionSet& scan) {
+void bring_rows_to_heights(const fs::path& path, const io::RawScan& raw, const ScanOptions& options,
+                           ProjectionSet& scan) {
   try {
-    common_heights(scan, options.preparation, options.max_memory_bytes, options.scratch);
+    bring_to_heights(scan, wanted_of(raw, options), options.max_memory_bytes, options.scratch);
   } catch (const InputError& e) {
     throw FileError(path.string() + ": " + e.what() + io::part_at_rest(raw, scan.geometry.pitch_v));
   }
@@ -365,7 +371,7 @@ ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const
   for (std::string& words : in_time.record(scan.report.preparation))
     scan.report.notes.push_back(std::move(words));
   prepare_scan(scan, scan.report.preparation, options.max_memory_bytes, progress);
-  bring_to_common_heights(path, raw, options, scan);
+  bring_rows_to_heights(path, raw, options, scan);
   if (!raw.cone) choose_center(path, raw, options, scan);
   extend(path, raw, options, scan, understood);
   return scan;

@@ -14,6 +14,7 @@ ProjectionSet rows_of(const ProjectionSet& scan, std::int64_t first, std::int64_
   ProjectionSet out;
   out.geometry = g;
   out.geometry.rows = rows;
+  out.geometry.series.first += first;
   out.report = scan.report;
   const std::int64_t run = rows * g.columns;
   out.data = SampleArray(std::vector<float>(static_cast<std::size_t>(g.views() * run)));

@@ -36,6 +36,13 @@ void require_samples(const fs::path& path, const ProjectionSet& scan) {
                                  io::shape_text(shape)));
 }
 
+void require_no_series(const fs::path& path, const ParallelGeometry& g) {
+  if (!g.series.none())
+    throw InputError(path.string() +
+                     ": rows of a series of heights are weighted by height, which no file says; its own "
+                     "file has the projections as they were measured");
+}
+
 // What says where the samples of /exchange/data lie.
 void write_geometry(io::hdf5::Writer& file, const ParallelGeometry& g) {
   file.attribute(kData, "axes", "theta:y:x");
@@ -178,6 +185,7 @@ void write_counts(io::hdf5::Writer& file, const ProjectionSet& scan, const Photo
 
 void write_data_exchange(const fs::path& path, const ProjectionSet& scan) {
   require_samples(path, scan);
+  require_no_series(path, scan.geometry);
   const ParallelGeometry& g = scan.geometry;
   io::AtomicFile target(path);
   io::hdf5::Writer file(target.temporary(), path, {.headers = io::hdf5::Headers::dated});
@@ -192,6 +200,7 @@ void write_data_exchange(const fs::path& path, const ProjectionSet& scan) {
 
 void write_photon_counts(const fs::path& path, const ProjectionSet& scan, const PhotonCounts& counts) {
   require_samples(path, scan);
+  require_no_series(path, scan.geometry);
   constexpr double most_photons = 1e9;
   if (!(counts.photons >= 1 && counts.photons <= most_photons))
     throw InputError(

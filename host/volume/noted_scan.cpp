@@ -25,6 +25,20 @@ RowExtension extension_of(const nlohmann::json& e) {
   return out;
 }
 
+HeightSeries series_of(const nlohmann::json& g) {
+  HeightSeries s{g.at("rows").get<std::int64_t>(),
+                 g.at("first").get<std::int64_t>(),
+                 g.at("full_turn").get<bool>(),
+                 g.at("theta_rad").get<std::vector<double>>(),
+                 g.at("row_shift").get<std::vector<double>>(),
+                 g.value("column_shift", std::vector<double>{})};
+  if (s.rows < 1 || s.theta_rad.empty() || s.row_shift.size() != s.theta_rad.size() ||
+      (!s.column_shift.empty() && s.column_shift.size() != s.theta_rad.size()))
+    throw FileError(
+        "certificate, options.geometry.series: rows, and one number of each kind a view, are needed");
+  return s;
+}
+
 }  // namespace
 
 std::optional<ProjectionSet> noted_geometry(const Certificate& certificate) {
@@ -48,6 +62,7 @@ std::optional<ProjectionSet> noted_geometry(const Certificate& certificate) {
       if (shift->size() != geometry.theta_rad.size())
         throw FileError(fmt::format("certificate, options.geometry.{}: one number is needed a view", name));
     }
+    if (g.contains("series")) geometry.series = series_of(g.at("series"));
     if (g.contains("extension")) geometry.extension = extension_of(g.at("extension"));
     geometry.axis_roll_deg = g.value("axis_roll", 0.0);
     require_axis_roll(geometry.axis_roll_deg, "certificate, options.geometry.axis_roll");

@@ -165,6 +165,7 @@ void add_geometry(nb::module_& m) {
       .value("none", Padding::none)
       .value("edge", Padding::edge)
       .value("mirror", Padding::mirror);
+  nb::enum_<Heights>(m, "Heights").value("common", Heights::common).value("all", Heights::all);
   nb::class_<Preparation>(m, "Preparation")
       .def(nb::init<>())
       .def_rw("outliers", &Preparation::outliers)
@@ -175,6 +176,7 @@ void add_geometry(nb::module_& m) {
       .def_rw("binning", &Preparation::binning)
       .def_rw("half_acquisition", &Preparation::half_acquisition)
       .def_rw("padding", &Preparation::padding)
+      .def_rw("heights", &Preparation::heights)
       .def_rw("flats_in_time", &Preparation::flats_in_time)
       .def_rw("beam_current", &Preparation::beam_current)
       .def("__str__", [](const Preparation& p) { return text_of(p); });
@@ -221,6 +223,7 @@ void add_projections(nb::module_& m) {
       .def_rw("center", &ArrayScan::center)
       .def_rw("half_acquisition", &ArrayScan::half_acquisition)
       .def_rw("padding", &ArrayScan::padding)
+      .def_rw("heights", &ArrayScan::heights)
       .def_rw("shifts", &ArrayScan::shifts)
       .def_rw("axis_roll_deg", &ArrayScan::axis_roll_deg)
       .def_rw("pitch_u", &ArrayScan::pitch_u)
@@ -240,7 +243,10 @@ void add_projections(nb::module_& m) {
       .def_prop_ro("theta_rad", [](const ProjectionSet& s) { return s.geometry.theta_rad; })
       .def_prop_ro("angles_deg", [](const ProjectionSet& s) { return degrees_of(s.geometry.theta_rad); })
       .def_prop_ro("column_shift", [](const ProjectionSet& s) { return s.geometry.column_shift; })
-      .def_prop_ro("row_shift", [](const ProjectionSet& s) { return s.geometry.row_shift; })
+      .def_prop_ro("row_shift",
+                   [](const ProjectionSet& s) {
+                     return s.geometry.series.none() ? s.geometry.row_shift : s.geometry.series.row_shift;
+                   })
       .def_prop_ro("is_cone", [](const ProjectionSet& s) { return s.cone.has_value(); })
       .def_prop_ro("name", [](const ProjectionSet& s) { return s.report.name; })
       .def_prop_ro("sha256", [](const ProjectionSet& s) { return s.report.sha256; })

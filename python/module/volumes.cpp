@@ -93,13 +93,13 @@ FileVerification verified(Device& device, const VdvrFile& file, const Projection
                           const std::optional<ScanSource>& source, const VerifyOptions& options,
                           const Progress& report) {
   const RowExtension& e = scan.geometry.extension;
-  if (!source || (e.before == 0 && e.after == 0 && !e.common_heights))
+  if (!source || (e.before == 0 && e.after == 0 && !e.common_heights && scan.geometry.series.none()))
     return verify_file(device, file, scan, options, report);
   check_input(scan, file.certificate);
   ScanOptions measured = source->how;
   measured.preparation.half_acquisition = false;
   measured.preparation.padding = Padding::none;
-  measured.preparation.common_heights = false;
+  measured.preparation.heights = Heights::as_seen;
   ProjectionSet rows;
   {
     const std::lock_guard turn(hdf5_turn());

@@ -53,6 +53,8 @@ class Scan:
     half_acquisition : a full turn about an axis off the middle, whose opposite views are rows of a wider detector;
         by default as axis and arc say, and `notes` tell.
     pad : "edge" or "mirror": how rows of objects wider than the detector go on beyond it, tapering to zero.
+    heights : "common" or "all", of rows that are shifted: those that all views see, or all that are seen from every
+        direction; by default all where views share fewer than half of their rows.
     shifts : how far the sample stood in each view towards higher columns, or columns and rows, in `unit`: array
         [view] or [view, 2].
     axis_roll : degrees by which the axis leans in the detector's plane, towards higher columns at higher rows.
@@ -79,6 +81,7 @@ class Scan:
         line_integrals: bool = False,
         half_acquisition: Optional[bool] = None,
         pad: str = "none",
+        heights: Optional[str] = None,
         shifts: Optional["ArrayLike"] = None,
         axis_roll: float = 0.0,
     ) -> None:
@@ -90,6 +93,7 @@ class Scan:
         described.unit = unit
         described.half_acquisition = half_acquisition
         described.padding = choice(_core.Padding, pad, "pad")
+        described.heights = None if heights is None else choice(_core.Heights, heights, "heights")
         described.name = name
         described.axis_roll_deg = number(axis_roll, "axis_roll")
         if shifts is not None:
@@ -209,6 +213,7 @@ def read_scan(
     phase: Optional[Sequence[float]] = None,
     half_acquisition: Optional[bool] = None,
     pad: str = "none",
+    heights: Optional[str] = None,
     flats_in_time: Optional[bool] = None,
     beam_current: Optional[str] = None,
     entry: Optional[str] = None,
@@ -245,6 +250,8 @@ def read_scan(
     half_acquisition : a full turn about an axis off the middle, whose opposite views are rows of a wider detector;
         by default as axis and arc say, with a warning.
     pad : "edge" or "mirror": how rows of objects wider than the detector go on beyond it, tapering to zero.
+    heights : "common" or "all", of views that saw the sample at other heights: those that all see, or all that are
+        seen from every direction; by default all where views share fewer than half of their rows.
     flats_in_time : divides projections by what lies between the flats before and after them; by default where the
         order of frames is known. False: by the mean of all flats.
     beam_current : the dataset of an HDF5 file with the beam's current in each frame, by which frames are divided; by
@@ -281,6 +288,7 @@ def read_scan(
         preparation.phase = _step(_core.PhaseRetrieval(), members, numbers(phase, 3, "phase"), "phase")
     preparation.half_acquisition = None if half_acquisition is None else bool(half_acquisition)
     preparation.padding = choice(_core.Padding, pad, "pad")
+    preparation.heights = None if heights is None else choice(_core.Heights, heights, "heights")
     preparation.flats_in_time = None if flats_in_time is None else bool(flats_in_time)
     options.preparation = preparation
     scan = Scan._of(*_core.read_scan(path, options, progress), _core.ScanSource(path, options))

@@ -4,7 +4,7 @@
 #include <random>
 
 #include "host/certify/bounds/amplitude_bounds.hpp"
-#include "host/field/fbp/view_weights.hpp"
+#include "host/scan/geometry/view_weights.hpp"
 #include "tests/support/attack_chain.hpp"
 #include "tests/support/attack_scans.hpp"
 #include "tests/support/exact_columns.hpp"

@@ -6,7 +6,7 @@
 
 #include "host/base/opencl/fft.hpp"
 #include "host/field/fbp/ramp_kernel.hpp"
-#include "host/field/fbp/view_weights.hpp"
+#include "host/scan/geometry/view_weights.hpp"
 #include "tests/reference/cosine_series.hpp"
 #include "tests/reference/ramp_filter.hpp"
 #include "tests/support/scans.hpp"

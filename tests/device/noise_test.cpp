@@ -5,7 +5,7 @@
 
 #include <boost/test/unit_test.hpp>
 
-#include "host/field/fbp/view_weights.hpp"
+#include "host/scan/geometry/view_weights.hpp"
 #include "host/field/noise/field_variance.hpp"
 #include "host/field/noise/split_of_views.hpp"
 #include "tests/reference/field_variance.hpp"

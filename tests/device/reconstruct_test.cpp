@@ -5,7 +5,7 @@
 
 #include "host/field/fbp/filter_projections.hpp"
 #include "host/field/fbp/ramp_kernel.hpp"
-#include "host/field/fbp/view_weights.hpp"
+#include "host/scan/geometry/view_weights.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"

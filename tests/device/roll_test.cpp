@@ -8,7 +8,7 @@
 #include <random>
 
 #include "host/base/system/casts.hpp"
-#include "host/scan/prepare/common_heights.hpp"
+#include "host/scan/prepare/heights.hpp"
 #include "host/scan/prepare/upright_rows.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/scans.hpp"
@@ -40,7 +40,7 @@ SimulateOptions leaning(double roll_deg, int views = 90) {
 }
 
 ProjectionSet upright(ProjectionSet scan) {
-  common_heights(scan, {}, 0, {});
+  bring_to_heights(scan, {}, 0, {});
   return scan;
 }
 
@@ -216,7 +216,7 @@ BOOST_AUTO_TEST_CASE(no_roll_leaves_a_scan_as_it_is) {
   const ProjectionSet own = noise_scan(3, 6, 9), scan = upright(own);
   BOOST_TEST((scan.geometry == own.geometry));
   BOOST_TEST(std::equal(scan.data.begin(), scan.data.end(), own.data.begin()));
-  BOOST_TEST(!scan.report.preparation.common_heights.has_value());
+  BOOST_TEST(!scan.report.preparation.heights.has_value());
 }
 
 // White noise stays white to 1 / c of its variance, which is what docs/noise.md takes it for.
@@ -291,7 +291,7 @@ BOOST_AUTO_TEST_CASE(a_roll_that_leaves_nothing_is_refused) {
   for (const double roll : {std::nan(""), 10.5, -HUGE_VAL, 9.0}) {
     ProjectionSet scan = noise_scan(3, 3, 40);
     scan.geometry.axis_roll_deg = roll;
-    BOOST_CHECK_THROW(common_heights(scan, {}, 0, {}), InputError);
+    BOOST_CHECK_THROW(bring_to_heights(scan, {}, 0, {}), InputError);
   }
   ProjectionSet scan = noise_scan(3, 6, 8);
   scan.geometry.axis_roll_deg = 1;
@@ -307,7 +307,7 @@ BOOST_AUTO_TEST_CASE(certificates_hold_for_rolls_that_verify_follows_itself) {
       wanted.padding = padding;
       wanted.half_acquisition = false;
       static_cast<void>(extend_rows(scan, wanted));
-      scan.report.preparation.common_heights = true;
+      scan.report.preparation.heights = Heights::common;
       CertifyOptions options;
       options.grid.size = Index3{6, 6, 1};
       const BuildResult built = certify(device(), scan, Tolerance{.relative = 0.05}, options);

@@ -9,7 +9,7 @@
 
 #include "host/base/system/casts.hpp"
 #include "host/field/fbp/coverage.hpp"
-#include "host/scan/prepare/common_heights.hpp"
+#include "host/scan/prepare/heights.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/smooth_balls.hpp"
@@ -29,6 +29,13 @@ using vdvr::testing::smooth_balls;
 
 namespace {
 
+// Also where views share few heights.
+void to_common_heights(ProjectionSet& scan) {
+  Preparation wanted;
+  wanted.heights = Heights::common;
+  bring_to_heights(scan, wanted, 0, {});
+}
+
 std::vector<std::array<double, 2>> drawn(std::int64_t views, double along_u, double along_v,
                                          unsigned seed = 5) {
   std::mt19937 random(seed);
@@ -46,7 +53,7 @@ ProjectionSet simulated(const std::vector<std::array<double, 2>>& shifts, int vi
   o.rows = 25;
   o.shifts = shifts;
   ProjectionSet scan = simulate(smooth_balls(), o);
-  common_heights(scan, {}, 0, {});
+  to_common_heights(scan);
   return scan;
 }
 
@@ -97,7 +104,7 @@ BOOST_AUTO_TEST_CASE(covered_is_what_every_shifted_view_sees) {
 
 BOOST_AUTO_TEST_CASE(device_and_definition_agree_on_shifted_views) {
   ProjectionSet scan = shifted_noise(40, 4, 41, 3, 1);
-  common_heights(scan, {}, 0, {});
+  to_common_heights(scan);
   GridOptions options;
   options.size = Index3{9, 9, 1};
   const Grid grid = make_grid(scan, options);
@@ -121,7 +128,7 @@ BOOST_AUTO_TEST_CASE(verify_brings_rows_to_the_same_heights) {
     const ProjectionSet own =
         shifted_noise(5, rows, 14, 0, 0.45 * static_cast<double>(rows - 1), static_cast<unsigned>(random()));
     ProjectionSet scan = own;
-    common_heights(scan, {}, 0, {});
+    to_common_heights(scan);
     FieldOptions field;
     field.preparation = scan.report.preparation;
     const ProjectionSet again = rows_to_verify(own, field);
@@ -140,7 +147,7 @@ BOOST_AUTO_TEST_CASE(whole_rows_are_taken_as_they_are) {
   ProjectionSet scan = noise_scan(3, 6, 8);
   const ProjectionSet own = scan;
   scan.geometry.row_shift = {2, 0, 1};
-  common_heights(scan, {}, 0, {});
+  to_common_heights(scan);
   BOOST_REQUIRE(scan.geometry.rows == 4);
   for (std::int64_t k = 0; k < 3; ++k)
     for (std::int64_t j = 0; j < 4; ++j)
@@ -152,7 +159,7 @@ BOOST_AUTO_TEST_CASE(whole_rows_are_taken_as_they_are) {
 BOOST_AUTO_TEST_CASE(heights_that_no_view_shares_are_refused) {
   ProjectionSet scan = noise_scan(3, 6, 8);
   scan.geometry.row_shift = {0, 3, 6.5};
-  BOOST_CHECK_THROW(common_heights(scan, {}, 0, {}), InputError);
+  BOOST_CHECK_THROW(to_common_heights(scan), InputError);
   scan.geometry.row_shift = {0, 1, 2};
   BOOST_CHECK_THROW(static_cast<void>(check_scan(scan.geometry)), InputError);  // rows as they were seen
   scan.geometry.row_shift.clear();
@@ -176,7 +183,7 @@ BOOST_AUTO_TEST_CASE(certificates_hold_for_shifts_that_verify_follows_itself) {
   for (const auto& [u, v] : {std::pair{4.0, 0.0}, {0.0, 1.2}, {3.0, 1.0}}) {
     const ProjectionSet measured = shifted_noise(24, 5, 30, u, v);
     ProjectionSet scan = measured;
-    common_heights(scan, {}, 0, {});
+    to_common_heights(scan);
     CertifyOptions options;
     options.grid.size = Index3{6, 6, 1};
     const BuildResult built = certify(device(), scan, Tolerance{.relative = 0.05}, options);

@@ -5,7 +5,7 @@
 #include <sstream>
 
 #include "host/files/io/npy_file.hpp"
-#include "host/scan/geometry/rtk_geometry.hpp"
+#include "host/scan/open/rtk_geometry.hpp"
 #include "tests/support/cone_files.hpp"
 
 using namespace vdvr;

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "host/field/fbp/coverage.hpp"
-#include "host/field/fbp/view_weights.hpp"
+#include "host/scan/geometry/view_weights.hpp"
 #include "tests/reference/longer_rows.hpp"
 #include "tests/support/scans.hpp"
 #include "vdvr/error.hpp"

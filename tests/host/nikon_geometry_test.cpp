@@ -4,7 +4,7 @@
 #include <optional>
 #include <sstream>
 
-#include "host/scan/geometry/nikon_geometry.hpp"
+#include "host/scan/open/nikon_geometry.hpp"
 #include "tests/support/cone_files.hpp"
 #include "vdvr/expert/hash.hpp"
 

@@ -1,7 +1,7 @@
 // Densities do not depend on how views are spread over all directions, and wedges are told. Random scans of
 // ten kinds, held to the same disc at equal angles; `view_weights_test -- N` tries N of each beam.
 #define BOOST_TEST_MODULE view_weights
-#include "host/field/fbp/view_weights.hpp"
+#include "host/scan/geometry/view_weights.hpp"
 
 #include <algorithm>
 #include <array>

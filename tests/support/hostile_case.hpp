@@ -15,8 +15,9 @@
 #include <vector>
 
 #include "host/field/fbp/coverage.hpp"
-#include "host/scan/prepare/common_heights.hpp"
+#include "host/scan/prepare/heights.hpp"
 #include "tests/support/attack_scans.hpp"
+#include "vdvr/error.hpp"
 #include "vdvr/expert/build.hpp"
 #include "vdvr/expert/exact_field.hpp"
 #include "vdvr/expert/extend_rows.hpp"
@@ -320,6 +321,36 @@ inline void draw_roll(std::uint64_t seed, ProjectionSet& scan, std::string& name
   name += ", axis leans by " + std::to_string(g.axis_roll_deg);
 }
 
+/// One case in five of those with rows and views to spare, and no shift, saw its heights one after another:
+/// in two or three stands whose views come by turns, or on a helix. Drawn apart, so that other cases stay as
+/// they are.
+inline void draw_series(std::uint64_t seed, ProjectionSet& scan, std::string& name) {
+  Random random(seed * 0xe7037ed1a0b428dbu + 17);
+  ParallelGeometry& g = scan.geometry;
+  if (!chance(random, 0.25) || g.rows < 3 || g.views() < 8 || !g.row_shift.empty() || g.axis_roll_deg != 0)
+    return;
+  ProjectionSet moved = scan;
+  ParallelGeometry& m = moved.geometry;
+  const bool helix = chance(random, 0.5), whole = chance(random, 0.3);
+  const auto stands = one_of<std::int64_t>(random, {2, 3});
+  const double step = (0.2 + 0.7 * unit(random)) * static_cast<double>(m.rows);
+  for (std::int64_t k = 0; k < m.views(); ++k) {
+    const double turns = static_cast<double>(stands * k) / static_cast<double>(m.views()),
+                 shift = helix ? 0.5 * step * turns : step * static_cast<double>(k % stands);
+    m.row_shift.push_back(whole ? std::trunc(shift) : shift);
+    if (helix) m.theta_rad[static_cast<std::size_t>(k)] *= static_cast<double>(stands);
+  }
+  Preparation wanted;
+  wanted.heights = Heights::all;
+  try {
+    bring_to_heights(moved, wanted, 0, {});
+  } catch (const InputError&) {
+    return;  // nothing is covered, or not one run
+  }
+  scan = std::move(moved);
+  name += std::string(helix ? ", a helix of " : ", stands of ") + std::to_string(g.rows) + " heights";
+}
+
 inline void draw_scan(std::uint64_t of_shifts, Random& random, Case& c) {
   ParallelGeometry g = draw_geometry(random, c.name);
   draw_shifts(of_shifts, g, c.name);
@@ -487,7 +518,7 @@ inline void draw_longer_rows(std::uint64_t seed, Case& c) {
   ParallelGeometry& g = c.scan.geometry;
   Preparation wanted;
   wanted.half_acquisition =
-      g.column_shift.empty() && g.columns >= 11 && g.views() >= 3 && chance(random, 0.6);
+      g.series.none() && g.column_shift.empty() && g.columns >= 11 && g.views() >= 3 && chance(random, 0.6);
   wanted.padding = one_of(random, {Padding::none, Padding::edge, Padding::mirror});
   if (*wanted.half_acquisition) {
     const double near = 5 + unit(random) * (0.5 * static_cast<double>(g.columns) - 5);
@@ -527,7 +558,12 @@ inline Case draw_case(std::uint64_t seed) {
   Case c;
   draw_scan(seed, random, c);
   draw_roll(seed, c.scan, c.name);
-  common_heights(c.scan, {}, 0, {});
+  draw_series(seed, c.scan, c.name);
+  if (c.scan.geometry.series.none()) {
+    Preparation wanted;
+    wanted.heights = Heights::common;
+    bring_to_heights(c.scan, wanted, 0, {});
+  }
   c.scan.report.notes.clear();
   draw_longer_rows(seed, c);
   draw_options(random, c);

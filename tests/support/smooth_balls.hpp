@@ -46,16 +46,17 @@ inline Phantom smooth_balls() {
   return phantom;
 }
 
-// The largest difference of F from the density, of 1.
-inline double off_by(const ProjectionSet& scan) {
+// The largest difference of F from the density, of 1, at heights up to `reach` from the scan's middle, which
+// is at the height `middle` of the balls.
+inline double off_by(const ProjectionSet& scan, double middle = 0, double reach = 4) {
   std::vector<Vec3> points;
-  for (double z = -4; z <= 4; z += 2)
+  for (double z = -reach; z <= reach; z += 2)
     for (double y = -12; y <= 12; y += 3)
       for (double x = -12; x <= 12; x += 3) points.push_back({x, y, z});
   const std::vector<double> F = ExactField(scan, {}).at(points);
   double worst = 0;
   for (std::size_t i = 0; i < points.size(); ++i)
-    worst = std::max(worst, std::abs(F[i] - density_at(points[i])));
+    worst = std::max(worst, std::abs(F[i] - density_at({points[i][0], points[i][1], points[i][2] + middle})));
   return worst;
 }
 

@@ -51,9 +51,12 @@ void members(auto& way, Of<Grid> auto& g) { way(g.cells, g.origin, g.spacing, g.
 void members(auto& way, Of<RowExtension> auto& e) {
   way(e.half_acquisition, e.padding, e.before, e.after, e.center, e.common_heights, e.cut);
 }
+void members(auto& way, Of<HeightSeries> auto& s) {
+  way(s.rows, s.first, s.full_turn, s.theta_rad, s.row_shift, s.column_shift);
+}
 void members(auto& way, Of<ParallelGeometry> auto& g) {
   way(g.columns, g.rows, g.pitch_u, g.pitch_v, g.center, g.unit, g.theta_rad, g.extension, g.column_shift,
-      g.row_shift, g.axis_roll_deg);
+      g.row_shift, g.axis_roll_deg, g.series);
 }
 void members(auto& way, Of<IntegerLattice> auto& l) {
   way(l.step, l.base, l.least, l.base_shift, l.finest_shift);

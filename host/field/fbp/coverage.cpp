@@ -9,7 +9,7 @@
 #include <numbers>
 
 #include "host/base/system/casts.hpp"
-#include "host/field/fbp/view_weights.hpp"
+#include "host/scan/geometry/view_weights.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/extend_rows.hpp"
 #include "vdvr/expert/reconstruct.hpp"

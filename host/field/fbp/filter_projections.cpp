@@ -14,7 +14,7 @@
 #include "host/base/system/parallel.hpp"
 #include "host/field/fbp/batched_product.hpp"
 #include "host/field/fbp/ramp_kernel.hpp"
-#include "host/field/fbp/view_weights.hpp"
+#include "host/scan/geometry/view_weights.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

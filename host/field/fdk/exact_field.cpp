@@ -13,7 +13,7 @@
 #include "host/base/system/parallel.hpp"
 #include "host/field/fbp/coverage.hpp"
 #include "host/field/fbp/ramp_kernel.hpp"
-#include "host/field/fbp/view_weights.hpp"
+#include "host/scan/geometry/view_weights.hpp"
 #include "host/field/fdk/cone_coverage.hpp"
 #include "host/field/fdk/fdk_weights.hpp"
 #include "host/field/fdk/filter_cone.hpp"

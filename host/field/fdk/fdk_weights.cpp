@@ -9,7 +9,7 @@
 #include <numbers>
 
 #include "host/base/system/casts.hpp"
-#include "host/field/fbp/view_weights.hpp"
+#include "host/scan/geometry/view_weights.hpp"
 #include "host/scan/geometry/vectors.hpp"
 #include "vdvr/error.hpp"
 

@@ -10,7 +10,7 @@
 
 #include "vdvr/error.hpp"
 #include "vdvr/expert/extend_rows.hpp"
-#include "host/scan/prepare/common_heights.hpp"
+#include "host/scan/prepare/heights.hpp"
 #include "vdvr/expert/find_center.hpp"
 #include "vdvr/expert/hash.hpp"
 #include "vdvr/expert/reconstruct.hpp"
@@ -120,10 +120,11 @@ ProjectionSet scan_of_array(SampleArray data, const ArrayScan& described) {
   scan.report.name = described.name;
   scan.report.format = "array";
   scan.report.sha256 = hash_of(scan.data, described);
-  common_heights(scan, {}, 0, {});
-  set_center(scan, described.center);
   Preparation wanted;
   wanted.half_acquisition = described.half_acquisition;
+  wanted.heights = described.heights;
+  bring_to_heights(scan, wanted, 0, {});
+  set_center(scan, described.center);
   wanted.padding = described.padding;
   if (std::string recognised = extend_rows(scan, wanted); !recognised.empty())
     scan.report.notes.push_back(std::move(recognised));

@@ -133,8 +133,13 @@ std::vector<std::int64_t> views_by_angle(const ProjectionSet& scan) {
   // Scans of one turn or less stay as they are, wherever they begin.
   const auto [low, high] = std::minmax_element(theta.begin(), theta.end());
   const std::vector<double>& angle = *high - *low <= 2 * pi ? theta : turned;
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::int64_t a, std::int64_t b) { return angle[at(a)] < angle[at(b)]; });
+  // Views at other heights see other parts of the sample: neighbours are of one stand.
+  const std::vector<double>& shift = scan.geometry.row_shift;
+  const bool moved = !shift.empty() && !scan.geometry.extension.common_heights;
+  std::stable_sort(order.begin(), order.end(), [&](std::int64_t a, std::int64_t b) {
+    if (moved && shift[at(a)] != shift[at(b)]) return shift[at(a)] < shift[at(b)];
+    return angle[at(a)] < angle[at(b)];
+  });
   return order;
 }
 

@@ -24,7 +24,8 @@ std::optional<double> photons_by_differences(const ProjectionSet& scan,
 std::optional<double> photons_by_wedge(const ProjectionSet& scan,
                                        Integrals integrals = Integrals::logarithms);
 
-/// Views in the order of their angles; none twice.
+/// Views in the order of their angles, of rows as they were seen those of one height after another; none
+/// twice.
 std::vector<std::int64_t> views_by_angle(const ProjectionSet& scan);
 
 }  // namespace vdvr

@@ -22,7 +22,7 @@
 #include "host/field/fbp/cosine_series.hpp"
 #include "host/field/fbp/ramp_kernel.hpp"
 #include "host/field/fbp/reconstruct.hpp"
-#include "host/field/fbp/view_weights.hpp"
+#include "host/scan/geometry/view_weights.hpp"
 #include "host/field/fdk/filter_cone.hpp"
 #include "host/field/fdk/reconstruct_cone.hpp"
 #include "vdvr/error.hpp"
@@ -40,7 +40,7 @@ double largest_variance(const ProjectionSet& scan, const LineIntegralNoise& nois
   std::vector<double> largest(at(scan.geometry.views()), 0.0);
   parallel_for(scan.geometry.views(), {}, "", [&](std::int64_t k) {
     for (std::int64_t i = 0; i < pixels; ++i)
-      largest[at(k)] = std::max(largest[at(k)], variance.of_sample(i, scan.data[at(k * pixels + i)]));
+      largest[at(k)] = std::max(largest[at(k)], variance.of_sample(k, i, scan.data[at(k * pixels + i)]));
   });
   const double all = *std::max_element(largest.begin(), largest.end());
   if (!(all > 0) || !std::isfinite(all))
@@ -51,15 +51,16 @@ double largest_variance(const ProjectionSet& scan, const LineIntegralNoise& nois
   return all;
 }
 
-// v of some heights of a view, double out[height][column].
-void variance_of_rows(std::span<const float> view, const ParallelGeometry& g, const SampleVariance& variance,
-                      std::span<const std::vector<RowShare>> heights, std::vector<double>& out) {
+// v of some heights of view k, double out[height][column].
+void variance_of_rows(std::int64_t k, std::span<const float> view, const ParallelGeometry& g,
+                      const SampleVariance& variance, std::span<const std::vector<RowShare>> heights,
+                      std::vector<double>& out) {
   std::fill(out.begin(), out.end(), 0.0);
   for (std::size_t h = 0; h < heights.size(); ++h)
     for (const RowShare& share : heights[h])
       for (std::int64_t i = 0; i < g.columns; ++i) {
         out[h * at(g.columns) + at(i)] +=
-            share.weight * variance(share.row, i, view[at(share.row * g.columns + i)]);
+            share.weight * variance(k, share.row, i, view[at(share.row * g.columns + i)]);
       }
 }
 
@@ -99,8 +100,8 @@ FieldVariance of_parallel(opencl::State& state, const ProjectionSet& scan, const
       parallel_for(g.views(), {}, "", [&](std::int64_t k) {
         const std::int64_t pixels = g.rows * g.columns;
         std::vector<double> rows(at(heights * g.columns));
-        variance_of_rows(std::span<const float>(scan.data).subspan(at(k * pixels), at(pixels)), g, variance,
-                         shares, rows);
+        variance_of_rows(k, std::span<const float>(scan.data).subspan(at(k * pixels), at(pixels)), g,
+                         variance, shares, rows);
         const double factor = weights[at(k)] * weights[at(k)] / unit;
         std::vector<std::vector<double>> sums;
         for (std::int64_t h = 0; h < heights; ++h)
@@ -267,6 +268,47 @@ double PixelVariance::operator()(std::size_t pixel, double p) const {
   const double open = std::exp(p);
   v += of(noise_.photon) * open;
   if (!noise_.read.empty()) v += of(noise_.read) * open * open;
+  return v;
+}
+
+SampleVariance::SampleVariance(const ParallelGeometry& g, const LineIntegralNoise& noise)
+    : variance_(noise),
+      factors_(row_factors(g)),
+      columns_(g.columns),
+      own_(own_detector(g).columns),
+      before_(g.extension.before),
+      first_(g.series.first),
+      measured_rows_(g.series.none() ? g.rows : g.series.rows) {
+  if (!g.series.none()) series_ = std::make_shared<const WeightsByHeight>(g.series);
+}
+
+std::int64_t SampleVariance::nearest_row(std::int64_t measured_view, std::int64_t height) const {
+  return std::clamp<std::int64_t>(std::llround(series_->place(measured_view, height)), 0, measured_rows_ - 1);
+}
+
+namespace {
+
+// The sum of squares of S_v(place, r) over rows, which noise of rows passes by; 1 where a row is hit.
+double squares_of_rows(double place, std::int64_t rows) {
+  if (std::abs(place - std::round(place)) <= 1e-9) return 1;
+  const auto n = static_cast<double>(rows);
+  const double x = 2 * std::numbers::pi * (place + 0.5) / n, half = std::sin(0.5 * x);
+  // Dirichlet's sum of cos(m x), m = 1 .. n - 1.
+  const double sum = std::abs(half) < 1e-12 ? n - 1 : std::sin((n - 0.5) * x) / (2 * half) - 0.5;
+  return 1 + sum / n;
+}
+
+}  // namespace
+
+double SampleVariance::of_series(std::int64_t view, std::int64_t row, std::int64_t column, double sum) const {
+  const std::int64_t height = first_ + row;
+  const double shares = series_->shares(view, height).sum;
+  if (!(shares > 0)) return 0;
+  double v = 0;
+  for (const std::int64_t k : series_->measured(view))
+    if (const double share = series_->share(k, height); share != 0)
+      v += share * share * squares_of_rows(series_->place(k, height), measured_rows_) *
+           variance_(pixel_of(nearest_row(k, height), column), sum / shares);
   return v;
 }
 

@@ -2,11 +2,13 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "host/base/opencl/state.hpp"
 #include "host/base/system/casts.hpp"
+#include "host/scan/geometry/weights_by_height.hpp"
 #include "vdvr/expert/extend_rows.hpp"
 #include "vdvr/expert/field_options.hpp"
 #include "vdvr/expert/grid.hpp"
@@ -59,30 +61,52 @@ class PixelVariance {
 };
 
 /// The variance of samples of the scan's rows, which may be longer than the detector's: those of half
-/// acquisition were multiplied by a factor f, and have f^2 times the variance. Samples that padding added are
-/// copies of others and are left out: by t columns from the edge they change sigma by less than 3 % / t^2
-/// (docs/noise.md).
+/// acquisition were multiplied by a factor f, and have f^2 times the variance. Those of a series of heights
+/// are sums over measured views with shares c, and have the sum of c^2 v: each view is taken to have seen
+/// what their mean says. Samples that padding added are copies of others and are left out: by t columns from
+/// the edge they change sigma by less than 3 % / t^2 (docs/noise.md).
 class SampleVariance {
  public:
-  SampleVariance(const ParallelGeometry& g, const LineIntegralNoise& noise)
-      : variance_(noise),
-        factors_(row_factors(g)),
-        columns_(g.columns),
-        own_(own_detector(g).columns),
-        before_(g.extension.before) {}
-  double operator()(std::int64_t row, std::int64_t column, float sample) const {
+  SampleVariance(const ParallelGeometry& g, const LineIntegralNoise& noise);
+
+  double operator()(std::int64_t view, std::int64_t row, std::int64_t column, float sample) const {
     const auto factor = static_cast<double>(factors_[at(column)]);
     if (factor == 0) return 0;
-    const std::size_t pixel = at(row * own_ + column - before_);
-    return factor * factor * variance_(pixel, static_cast<double>(sample) / factor);
+    const double measured = static_cast<double>(sample) / factor;
+    if (series_) return factor * factor * of_series(view, row, column, measured);
+    return factor * factor * variance_(pixel_of(row, column), measured);
   }
   /// Of a view's samples, one row after another.
-  double of_sample(std::int64_t i, float sample) const { return (*this)(i / columns_, i % columns_, sample); }
+  [[nodiscard]] double of_sample(std::int64_t view, std::int64_t i, float sample) const {
+    return (*this)(view, i / columns_, i % columns_, sample);
+  }
+
+  /// Of a pixel of the detector as it was measured, where a line integral is 0.
+  [[nodiscard]] double of_open_pixel(std::int64_t pixel) const { return variance_(at(pixel), 0); }
+  [[nodiscard]] std::int64_t pixels() const { return measured_rows_ * own_; }
+  /// `put(pixel, factor)` for each measured pixel that a sample is a sum of, and times what.
+  template <class Put>
+  void for_each_pixel(std::int64_t view, std::int64_t row, std::int64_t column, const Put& put) const {
+    const auto factor = static_cast<double>(factors_[at(column)]);
+    if (factor == 0) return;
+    if (!series_) return put(static_cast<std::int64_t>(pixel_of(row, column)), factor);
+    const std::int64_t height = first_ + row;
+    for (const std::int64_t k : series_->measured(view))
+      if (const double share = series_->share(k, height); share != 0)
+        put(static_cast<std::int64_t>(pixel_of(nearest_row(k, height), column)), factor * share);
+  }
 
  private:
+  [[nodiscard]] std::size_t pixel_of(std::int64_t row, std::int64_t column) const {
+    return at(row * own_ + column - before_);
+  }
+  [[nodiscard]] std::int64_t nearest_row(std::int64_t measured_view, std::int64_t height) const;
+  [[nodiscard]] double of_series(std::int64_t view, std::int64_t row, std::int64_t column, double sum) const;
+
   PixelVariance variance_;
   std::vector<float> factors_;
-  std::int64_t columns_, own_, before_;
+  std::int64_t columns_, own_, before_, first_, measured_rows_;
+  std::shared_ptr<const WeightsByHeight> series_;
 };
 
 /// float variance[z][y][x] / scale on the grid's samples, world units; scale brings them to order one.

@@ -140,6 +140,10 @@ std::optional<ScanNoise> scan_noise(const ProjectionSet& scan, const NoiseOption
     if (why) *why = std::move(reason);
     return std::nullopt;
   };
+  if (!scan.geometry.series.none())
+    return none(
+        "the views are put together of others, by height; state the noise of these by `photons` or "
+        "`sigma_p`");
   if (changes_noise(scan.report.preparation))
     return none(
         "the projections were prepared, which changes what their noise looks like; state the noise of the "

@@ -224,7 +224,7 @@ bool changes_noise(Preparation preparation) {
   // Of normalisation, which the noise of counts has in it already.
   preparation.flats_in_time = preparation.beam_current = {};
   // S_v of rows of equal noise has that noise too, but for its correlation along z.
-  preparation.common_heights = {};
+  preparation.heights = {};
   return !preparation.none();
 }
 

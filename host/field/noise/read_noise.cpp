@@ -1,6 +1,9 @@
 // The noise of a scan in files; see vdvr/expert/noise.hpp.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <map>
+
 #include "host/field/noise/field_variance.hpp"
 #include "host/field/noise/passed_noise.hpp"
 #include "host/scan/prepare/upright_rows.hpp"
@@ -18,8 +21,10 @@ ScanOptions as_measured(ScanOptions how, const ProjectionSet& scan) {
   if (!scan.cone || how.center)
     how.center =
         unbinned_center(how.center.value_or(stated_center({}, scan.geometry)), how.preparation.binning);
+  const bool as_seen = how.preparation.heights == Heights::as_seen;
   how.preparation = {};
   how.preparation.half_acquisition = false;
+  how.preparation.heights = as_seen ? Heights::as_seen : scan.report.preparation.heights;
   return how;
 }
 
@@ -83,9 +88,63 @@ std::optional<ScanNoise> of_prepared(const std::filesystem::path& path, const Sc
 
 }  // namespace
 
+namespace {
+
+// Views of the longest stand at one height; of a helix, which has none, all.
+ProjectionSet one_stand(ProjectionSet seen) {
+  ParallelGeometry& g = seen.geometry;
+  constexpr std::int64_t fewest_views = 16;
+  std::map<double, std::int64_t> stands;
+  for (const double shift : g.row_shift) ++stands[shift];
+  const auto longest = std::max_element(stands.begin(), stands.end(),
+                                        [](const auto& a, const auto& b) { return a.second < b.second; });
+  if (longest == stands.end() || longest->second < fewest_views) return seen;
+  const std::int64_t plane = g.rows * g.columns;
+  ParallelGeometry own = g;
+  own.theta_rad.clear();
+  own.column_shift.clear();
+  own.row_shift.clear();
+  std::vector<float> data;
+  for (std::int64_t k = 0; k < g.views(); ++k) {
+    if (g.row_shift[at(k)] != longest->first) continue;
+    own.theta_rad.push_back(g.theta_rad[at(k)]);
+    if (!g.column_shift.empty()) own.column_shift.push_back(g.column_shift[at(k)]);
+    data.insert(data.end(), seen.data.begin() + k * plane, seen.data.begin() + (k + 1) * plane);
+  }
+  seen.data = SampleArray(std::move(data));
+  g = std::move(own);
+  return seen;
+}
+
+// Noise is of views as they were measured; SampleVariance follows it into the series.
+std::optional<ScanNoise> of_series(const std::filesystem::path& path, ScanOptions how,
+                                   const ProjectionSet& scan, const NoiseOptions& options, std::string* why,
+                                   const Progress& progress) {
+  if (options.photons || options.sigma_p) return scan_noise(scan, options, {}, why);
+  how.preparation.heights = Heights::as_seen;
+  how.preparation.half_acquisition = false;
+  how.preparation.padding = Padding::none;
+  if (!how.center) how.center = stated_center({}, scan.geometry);
+  const ProjectionSet seen = one_stand(read_scan(path, how, progress));
+  if (seen.report.sha256 != scan.report.sha256)
+    throw FileError(path.string() + ": was changed while it was read; start again once it is whole");
+  return read_scan_noise(path, how, seen, options, why, progress);
+}
+
+}  // namespace
+
 std::optional<ScanNoise> read_scan_noise(const std::filesystem::path& path, const ScanOptions& how,
                                          const ProjectionSet& scan, const NoiseOptions& options,
                                          std::string* why, const Progress& progress) {
+  if (!scan.geometry.series.none()) {
+    try {
+      return of_series(path, how, scan, options, why, progress);
+    } catch (const ResourceError& e) {
+      // No build fails for want of it.
+      if (why) *why = e.what();
+      return std::nullopt;
+    }
+  }
   if (scan.geometry.extension != own_detector(scan.geometry).extension)
     return read_scan_noise(path, how, own_rows(scan), options, why, progress);
   if (!changes_noise(scan.report.preparation)) {

@@ -10,6 +10,7 @@
 #include "host/base/system/parallel.hpp"
 #include "host/field/fdk/filter_cone.hpp"
 #include "host/field/noise/estimate_photons.hpp"
+#include "host/scan/geometry/views_of_rows.hpp"
 #include "vdvr/expert/extend_rows.hpp"
 #include "vdvr/expert/noise.hpp"
 #include "vdvr/expert/reconstruct.hpp"
@@ -59,6 +60,10 @@ Middle middle_rows(const ProjectionSet& scan, const LineIntegralNoise& noise) {
     std::copy_n(scan.data.begin() + (k * g.rows + first) * g.columns, rows * g.columns,
                 data.begin() + k * rows * g.columns);
   out.scan.data = SampleArray(std::move(data));
+  if (!g.series.none()) {
+    out.scan.geometry.series.first += first;  // of which the noise is known row by measured row
+    return out;
+  }
   const std::int64_t own = own_detector(g).columns;
   for (std::vector<float>* values : {&out.noise.photon, &out.noise.read})
     if (values->size() > 1) *values = {values->begin() + first * own, values->begin() + (first + rows) * own};
@@ -126,6 +131,8 @@ std::vector<int> alternating_signs(const ProjectionSet& scan) {
 std::optional<SplitOfViews> split_of_views(Device& device, const ProjectionSet& scan,
                                            const FieldOptions& field, const LineIntegralNoise& noise,
                                            const Progress& progress) {
+  // Of views that see a part of the heights each no two are neighbours everywhere.
+  if (views_of_rows(scan, 0, 1)) return std::nullopt;
   Middle middle = middle_rows(scan, noise);
   ParallelGeometry& g = middle.scan.geometry;
   const double center = center_of(field, g);

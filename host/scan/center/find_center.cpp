@@ -9,6 +9,7 @@
 #include "host/scan/center/centroids.hpp"
 #include "host/scan/center/half_turn.hpp"
 #include "host/scan/center/opposite_rays.hpp"
+#include "host/scan/geometry/views_of_rows.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -108,6 +109,7 @@ std::optional<CenterEstimate> find_center(const ProjectionSet& scan) {
   if (static_cast<std::int64_t>(scan.data.size()) != scan.size())
     throw InputError(fmt::format("{} samples for {} views of {} x {}", scan.data.size(),
                                  scan.geometry.views(), scan.geometry.rows, scan.geometry.columns));
+  if (const auto middle = views_of_middle(scan)) return find_center(*middle);
   if (!scan.geometry.column_shift.empty() && scan.geometry.columns > 1)
     return find_center(brought_back(scan));
   if (is_flat(scan)) return std::nullopt;

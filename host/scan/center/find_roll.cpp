@@ -19,6 +19,7 @@
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
 #include "host/scan/center/row_bands.hpp"
+#include "host/scan/geometry/views_of_rows.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/find_center.hpp"
 
@@ -263,6 +264,7 @@ std::optional<RollEstimate> find_roll(const ProjectionSet& scan) {
   if (static_cast<std::int64_t>(scan.data.size()) != scan.size())
     throw InputError(
         fmt::format("{} samples for {} views of {} x {}", scan.data.size(), g.views(), g.rows, g.columns));
+  if (const auto middle = views_of_middle(scan)) return find_roll(*middle);
   const auto sums = view_pairs(g.theta_rad);
   const auto center = sums.empty() ? std::nullopt : find_center(scan);
   if (!center) return std::nullopt;

@@ -10,7 +10,6 @@
 #include "host/base/system/casts.hpp"
 #include "host/base/system/limits.hpp"
 #include "host/base/system/parallel.hpp"
-#include "host/scan/prepare/upright_rows.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/scratch.hpp"
 
@@ -29,8 +28,9 @@ double kernel(std::int64_t n, double d) {
   return std::sin((rows - 0.5) * x) / (2 * half) / rows;
 }
 
-// Weights of the view's rows at a place among them.
-std::vector<double> weights_at(std::int64_t rows, double place) {
+}  // namespace
+
+std::vector<double> row_weights_at(std::int64_t rows, double place) {
   std::vector<double> weights(at(rows), 0.0);
   const double nearest = std::round(place);
   if (std::abs(place - nearest) <= hit) {
@@ -43,24 +43,23 @@ std::vector<double> weights_at(std::int64_t rows, double place) {
   return weights;
 }
 
-}  // namespace
+std::int64_t count_of_common_heights(const ParallelGeometry& g) {
+  const auto [least, most] = std::minmax_element(g.row_shift.begin(), g.row_shift.end());
+  return std::max<std::int64_t>(
+      0, static_cast<std::int64_t>(std::floor(static_cast<double>(g.rows) - (*most - *least) + hit)));
+}
 
-void common_heights(ProjectionSet& scan, const Preparation& wanted, std::uint64_t max_memory_bytes,
+void common_heights(ProjectionSet& scan, std::uint64_t max_memory_bytes,
                     const std::filesystem::path& scratch) {
   ParallelGeometry& g = scan.geometry;
-  scan.report.preparation.common_heights = {};
-  if (!wanted.common_heights.value_or(true)) return;
-  if (g.axis_roll_deg != 0) return upright_rows(scan, max_memory_bytes, scratch);
-  if (g.row_shift.empty()) return;
   const auto [least, most] = std::minmax_element(g.row_shift.begin(), g.row_shift.end());
   const double range = *most - *least, middle = 0.5 * (*least + *most);
-  const auto common = static_cast<std::int64_t>(std::floor(static_cast<double>(g.rows) - range + hit));
+  const std::int64_t common = count_of_common_heights(g);
   if (common < 1)
     throw InputError(fmt::format(
-        "the sample moves by {:.4g} rows along the axis, and views of {} rows share no height: "
-        "helical scans and series of heights are taken apart by `views`, a part of at most {} rows "
-        "of motion at a time",
-        range, g.rows, g.rows - 1));
+        "the sample moves by {:.4g} rows along the axis, and views of {} rows share no height; `heights` all "
+        "takes those that are seen from every direction",
+        range, g.rows));
   const std::int64_t rows = g.rows, columns = g.columns;
   const auto size = static_cast<std::uint64_t>(g.views() * common * columns);
   auto room = scratch_for_scan(g.views(), common, columns, max_memory_bytes, scratch);
@@ -73,7 +72,7 @@ void common_heights(ProjectionSet& scan, const Preparation& wanted, std::uint64_
     for (std::int64_t j = 0; j < common; ++j) {
       const double place =
           0.5 * static_cast<double>(rows - common) + static_cast<double>(j) + g.row_shift[at(k)] - middle;
-      const std::vector<double> weights = weights_at(rows, place);
+      const std::vector<double> weights = row_weights_at(rows, place);
       std::fill(sum.begin(), sum.end(), 0.0);
       for (std::int64_t v = 0; v < rows; ++v) {
         if (weights[at(v)] == 0) continue;
@@ -87,7 +86,7 @@ void common_heights(ProjectionSet& scan, const Preparation& wanted, std::uint64_
   scan.data = std::move(out);
   g.rows = common;
   g.extension.common_heights = true;
-  scan.report.preparation.common_heights = true;
+  scan.report.preparation.heights = Heights::common;
   scan.report.notes.push_back(fmt::format(
       "common heights: the sample moves by {:.4g} rows along the axis; of {} rows {} are at heights "
       "that every view sees, and z = 0 is their middle",

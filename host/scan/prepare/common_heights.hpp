@@ -13,17 +13,21 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <vector>
 
-#include "vdvr/expert/preparation_steps.hpp"
 #include "vdvr/expert/projections.hpp"
 
 namespace vdvr {
 
-/// In place, and recorded in geometry and report; by upright_rows() where the axis leans. Does nothing where
-/// no rows are shifted and it does not, or where `wanted` says that heights are left as seen. Throws
-/// InputError where views share no height, ResourceError as read_scan. Cost: views * columns * rows^2
-/// multiply-adds.
-void common_heights(ProjectionSet& scan, const Preparation& wanted, std::uint64_t max_memory_bytes,
+/// V', 0 where views share no height.
+std::int64_t count_of_common_heights(const ParallelGeometry& geometry);
+
+/// In place, and recorded in geometry and report, of shifted rows. Throws InputError where views share no
+/// height, ResourceError as read_scan. Cost: views * columns * rows^2 multiply-adds.
+void common_heights(ProjectionSet& scan, std::uint64_t max_memory_bytes,
                     const std::filesystem::path& scratch);
+
+/// S_v: what each of so many rows weighs at a place among them.
+std::vector<double> row_weights_at(std::int64_t rows, double place);
 
 }  // namespace vdvr

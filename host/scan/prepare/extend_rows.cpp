@@ -212,6 +212,10 @@ std::string extend_rows(ProjectionSet& scan, const Preparation& wanted, std::uin
         "`half_acquisition` off takes the views as they are");
   const bool looks = g.column_shift.empty() && looks_half_acquired(g),
              half = wanted.half_acquisition.value_or(looks);
+  if (!g.series.none() && half != g.series.full_turn)
+    throw InputError(
+        "half acquisition: the axis is off the middle of a scan all around, and the weights of a series of "
+        "heights depend on what that means; state it by `half_acquisition`");
   if (half) require_half_acquisition(g);
   recorded.padding = wanted.padding;
   recorded.half_acquisition = {};

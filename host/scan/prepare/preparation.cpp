@@ -81,7 +81,10 @@ std::string text_of(const Preparation& p) {
     steps.push_back(fmt::format("gaussian {},{}", p.gaussian[0], p.gaussian[1]));
   if (p.binning > 1) steps.push_back(fmt::format("binning {}", p.binning));
   if (p.half_acquisition) steps.push_back(*p.half_acquisition ? "half acquisition" : "no half acquisition");
-  if (p.common_heights) steps.emplace_back(*p.common_heights ? "common heights" : "heights as seen");
+  if (p.heights)
+    steps.emplace_back(p.heights == Heights::all      ? "all heights"
+                       : p.heights == Heights::common ? "common heights"
+                                                      : "heights as seen");
   if (p.padding != Padding::none) steps.push_back(fmt::format("pad {}", text_of(p.padding)));
   return steps.empty() ? "none" : fmt::format("{}", fmt::join(steps, "; "));
 }

@@ -69,7 +69,8 @@ Json json_of(const Preparation& p) {
   if (p.binning > 1) json["binning"] = p.binning;
   if (p.half_acquisition) json["half_acquisition"] = *p.half_acquisition;
   if (p.padding != Padding::none) json["pad"] = text_of(p.padding);
-  if (p.common_heights) json["common_heights"] = *p.common_heights;
+  if (p.heights)
+    json[p.heights == Heights::all ? "all_heights" : "common_heights"] = p.heights != Heights::as_seen;
   if (p.flats_in_time) json["flats_in_time"] = *p.flats_in_time;
   if (p.beam_current) json["beam_current"] = *p.beam_current;
   return json;
@@ -78,7 +79,7 @@ Json json_of(const Preparation& p) {
 Preparation preparation_of(const Json& json) {
   require_members(json, "preparation",
                   {"outliers", "phase", "stripes", "median", "gaussian", "binning", "half_acquisition", "pad",
-                   "flats_in_time", "beam_current", "common_heights"});
+                   "flats_in_time", "beam_current", "common_heights", "all_heights"});
   Preparation p;
   if (json.contains("outliers")) {
     const Json& o = json.at("outliers");
@@ -105,7 +106,9 @@ Preparation preparation_of(const Json& json) {
   }
   if (json.contains("binning")) p.binning = whole(json.at("binning"), "binning");
   p.half_acquisition = said(json, "half_acquisition");
-  p.common_heights = said(json, "common_heights");
+  if (const auto common = said(json, "common_heights"))
+    p.heights = *common ? Heights::common : Heights::as_seen;
+  if (said(json, "all_heights").value_or(false)) p.heights = Heights::all;
   p.flats_in_time = said(json, "flats_in_time");
   p.beam_current = said(json, "beam_current");
   if (json.contains("pad")) {

@@ -206,7 +206,7 @@ void upright_rows(ProjectionSet& scan, std::uint64_t max_memory_bytes, const std
   g.center -= static_cast<double>(t.cut);
   g.extension.common_heights = true;
   g.extension.cut = t.cut;
-  scan.report.preparation.common_heights = true;
+  scan.report.preparation.heights = Heights::common;
 }
 
 std::int64_t nearest_pixel(const ParallelGeometry& upright, std::int64_t rows, std::int64_t columns,

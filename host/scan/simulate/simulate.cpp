@@ -47,7 +47,10 @@ void check(const Phantom& phantom, const SimulateOptions& o) {
                     phantom.name, phantom.background));
   if (o.cone) check_cone(phantom, *o.cone);
   if (o.angles < 1) refuse("angles", o.angles, "at least 1");
-  if (!positive(o.arc_deg) || o.arc_deg > 360) refuse("arc", o.arc_deg, "degrees above 0, up to 360");
+  const double most_arc = o.cone ? 360 : 360'000;  // of turns at several heights
+  if (!positive(o.arc_deg) || o.arc_deg > most_arc)
+    refuse("arc", o.arc_deg,
+           o.cone ? "degrees above 0, up to 360" : "degrees above 0, up to a thousand turns");
   if (o.columns < 1 || o.rows < 1)
     refuse("detector", fmt::format("{}x{}", o.columns, o.rows), "at least 1x1");
   if (!positive(o.pitch_u)) refuse("pitch in u", o.pitch_u, "a positive length");

@@ -93,6 +93,21 @@ void compare_shifts(Compare& out, const nlohmann::json& g, const char* name,
       return out.differs(fmt::format("{}[{}] is {}, not {}", member, k, noted[k], used[k]));
 }
 
+void compare_series(Compare& out, const nlohmann::json& g, const HeightSeries& used) {
+  if (g.contains("series") == used.none())
+    return out.differs(
+        fmt::format("options.geometry.series is {}", used.none() ? "not of these rows" : "missing"));
+  if (used.none()) return;
+  const auto& s = g.at("series");
+  out.integer("options.geometry.series.rows", s.at("rows").get<std::int64_t>(), used.rows);
+  out.integer("options.geometry.series.first", s.at("first").get<std::int64_t>(), used.first);
+  out.integer("options.geometry.series.full_turn", s.at("full_turn").get<bool>() ? 1 : 0,
+              used.full_turn ? 1 : 0);
+  compare_shifts(out, s, "theta_rad", used.theta_rad);
+  compare_shifts(out, s, "row_shift", used.row_shift);
+  compare_shifts(out, s, "column_shift", used.column_shift);
+}
+
 void compare_geometry(Compare& out, const nlohmann::json& g, const ParallelGeometry& used) {
   out.integer("options.geometry.columns", g.at("columns").get<std::int64_t>(), used.columns);
   out.integer("options.geometry.rows", g.at("rows").get<std::int64_t>(), used.rows);
@@ -102,6 +117,7 @@ void compare_geometry(Compare& out, const nlohmann::json& g, const ParallelGeome
   compare_extension(out, g, used.extension);
   compare_shifts(out, g, "column_shift", used.column_shift);
   compare_shifts(out, g, "row_shift", used.row_shift);
+  compare_series(out, g, used.series);
   out.number("options.geometry.axis_roll", g.value("axis_roll", 0.0), used.axis_roll_deg);
   out.integer("options.geometry.columns_cut", g.value("columns_cut", std::int64_t{0}), used.extension.cut);
   out.text("options.geometry.unit", g.at("unit").get<std::string>(), used.unit);

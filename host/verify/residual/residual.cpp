@@ -6,10 +6,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 
 #include "host/base/system/limits.hpp"
 #include "host/base/system/outward.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/scan/geometry/weights_by_height.hpp"
 #include "host/verify/residual/bounds_along.hpp"
 #include "host/verify/residual/primitives.hpp"
 #include "host/verify/residual/row_integrals.hpp"
@@ -45,6 +47,7 @@ ProjectionSet row_of(const ProjectionSet& scan, std::int64_t row) {
   ProjectionSet out;
   out.geometry = g;
   out.geometry.rows = 1;
+  out.geometry.series = {};
   std::vector<float> samples;
   for (std::int64_t k = 0; k < g.views(); ++k) {
     const float* first = scan.data.data() + (k * g.rows + row) * g.columns;
@@ -89,7 +92,8 @@ Residual residual(const ProjectionSet& scan, const MixedVolume& volume, const Ce
   // Rays are the detector's own; F is of longer rows, where rows were made so.
   const CoveredChords chords = covered_chords(longer);
   const std::vector<float> factors = row_factors(longer);
-  const bool weighted = longer.extension.half_acquisition.value_or(false);
+  const bool weighted = longer.extension.half_acquisition.value_or(false) || !longer.series.none();
+  const auto series = longer.series.none() ? nullptr : std::make_unique<const WeightsByHeight>(longer.series);
   const double middle = 0.5 * static_cast<double>(g.rows - 1);
   for (std::int64_t row = out.first_row; row < out.first_row + out.rows; ++row) {
     const auto done = static_cast<double>(row - out.first_row), all = static_cast<double>(out.rows);
@@ -99,21 +103,19 @@ Residual residual(const ProjectionSet& scan, const MixedVolume& volume, const Ce
     const BoundsAlong along(volume, bounds, (static_cast<double>(row) - middle) * g.pitch_v);
     parallel_for(g.views(), {}, "residual", [&](std::int64_t view) {
       const double c = std::cos(g.theta_rad[static_cast<std::size_t>(view)]),
-                   s = std::sin(g.theta_rad[static_cast<std::size_t>(view)]);
+                   s = std::sin(g.theta_rad[static_cast<std::size_t>(view)]),
+                   shares = series ? series->shares(view, longer.series.first + row).sum : 1;
+      if (!(shares > 0)) return;  // which did not see that height
       for (std::int64_t i = 0; i < g.columns; ++i) {
         const std::int64_t column = i + longer.extension.before;
         const auto ray = static_cast<std::size_t>(view * longer.columns + column);
         if (!(chords.first[ray] < chords.last[ray])) continue;
-        const double measured =
-            static_cast<double>(
-                scan.data[static_cast<std::size_t>((view * g.rows + row) * longer.columns + column)]) /
-            static_cast<double>(factors[static_cast<std::size_t>(column)]);
+        const double factor = shares * static_cast<double>(factors[static_cast<std::size_t>(column)]),
+                     measured = static_cast<double>(scan.data[static_cast<std::size_t>(
+                                    (view * g.rows + row) * longer.columns + column)]) /
+                                factor;
         // A weighted sample was rounded to float32, below the normal numbers by more.
-        const double rounded =
-                         weighted
-                             ? 0x1p-23 * std::abs(measured) +
-                                   0x1p-149 / static_cast<double>(factors[static_cast<std::size_t>(column)])
-                             : 0,
+        const double rounded = weighted ? 0x1p-23 * std::abs(measured) + 0x1p-149 / factor : 0,
                      rest = measured - f.integral[ray],
                      error =
                          f.error[ray] + rounded + 0x1p-52 * (std::abs(measured) + std::abs(f.integral[ray]));

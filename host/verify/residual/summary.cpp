@@ -1,8 +1,10 @@
 // Residuals in a few numbers: shares, the worst ray, view and column.
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include "vdvr/expert/extend_rows.hpp"
+#include "host/scan/geometry/weights_by_height.hpp"
 #include "vdvr/expert/residual.hpp"
 
 namespace vdvr {
@@ -50,18 +52,22 @@ ResidualSummary summary_of(const Residual& r, const ProjectionSet& scan) {
   const ParallelGeometry& g = r.geometry;
   const std::int64_t wide = scan.geometry.columns;
   const std::vector<float> factors = row_factors(scan.geometry);
+  const HeightSeries& of = scan.geometry.series;
+  const auto series = of.none() ? nullptr : std::make_unique<const WeightsByHeight>(of);
   ResidualSummary out;
   std::vector<Sums> views(static_cast<std::size_t>(g.views())), columns(static_cast<std::size_t>(g.columns));
   Sums all;
   double measured_square = 0, edge = 0, largest = 0;
   for (std::int64_t k = 0; k < g.views(); ++k)
-    for (std::int64_t v = r.first_row; v < r.first_row + r.rows; ++v)
+    for (std::int64_t v = r.first_row; v < r.first_row + r.rows; ++v) {
+      const double shares = series ? series->shares(k, of.first + v).sum : 1;
+      if (!(shares > 0)) continue;  // the view did not see that height
       for (std::int64_t i = 0; i < g.columns; ++i) {
         const std::size_t at = r.index(k, v, i);
         const std::int64_t column = i + scan.geometry.extension.before;
         const double measured = std::abs(
             static_cast<double>(scan.data[static_cast<std::size_t>((k * g.rows + v) * wide + column)]) /
-            static_cast<double>(factors[static_cast<std::size_t>(column)]));
+            (shares * static_cast<double>(factors[static_cast<std::size_t>(column)])));
         largest = std::max(largest, measured);
         // The nearer edge of half acquisition is within the object; rows are weighted down to nothing there.
         if ((i == 0 || i == g.columns - 1) && factors[static_cast<std::size_t>(column)] >= 1)
@@ -83,6 +89,7 @@ ResidualSummary summary_of(const Residual& r, const ProjectionSet& scan) {
           out.worst = {k, v, i};
         }
       }
+    }
   out.compared = all.rays;
   out.beyond_interpolation = all.beyond;
   out.rms = all.rms();

@@ -7,11 +7,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/verify/witness/series_to_verify.hpp"
 #include "host/verify/witness/upright_to_verify.hpp"
 #include "vdvr/error.hpp"
 
@@ -75,23 +75,6 @@ LongerRow longer_row(const ParallelGeometry& own, bool half, Padding padding) {
   return row;
 }
 
-// Of row v for the place y among n rows: 1/n (1 + 2 sum over m of cos(pi m (v + 1/2) / n) cos(pi m (y + 1/2)
-// / n)), term by term in long double, where common_heights.cpp has the closed form of its sum.
-std::vector<long double> series_at(std::int64_t n, long double y) {
-  constexpr long double half_turn = std::numbers::pi_v<long double>;
-  const auto rows = static_cast<long double>(n);
-  std::vector<long double> weights;
-  for (std::int64_t v = 0; v < n; ++v) {
-    long double sum = 1;
-    for (std::int64_t m = 1; m < n; ++m) {
-      const long double w = half_turn * static_cast<long double>(m) / rows;
-      sum += 2 * std::cos(w * (static_cast<long double>(v) + 0.5L)) * std::cos(w * (y + 0.5L));
-    }
-    weights.push_back(sum / rows);
-  }
-  return weights;
-}
-
 // Each view's rows at the heights that all views see.
 void to_common_heights(ProjectionSet& scan) {
   ParallelGeometry& g = scan.geometry;
@@ -103,6 +86,7 @@ void to_common_heights(ProjectionSet& scan) {
     --common;
   if (common < 1) throw InputError("rows_to_verify: views share no height");
   const std::int64_t n = g.rows, U = g.columns;
+  const SeriesWeights series(n);
   SampleArray out(at(g.views() * common * U), scan.data.scratch(), "the projections at common heights");
   parallel_for(g.views(), {}, "heights to verify", [&](std::int64_t k) {
     for (std::int64_t j = 0; j < common; ++j) {
@@ -117,11 +101,11 @@ void to_common_heights(ProjectionSet& scan) {
         std::copy_n(view + std::clamp<std::int64_t>(whole, 0, n - 1) * U, U, row);
         continue;
       }
-      const std::vector<long double> weights = series_at(n, y);
+      const std::vector<double> weights = series(y);
       for (std::int64_t u = 0; u < U; ++u) {
         long double sum = 0;
         for (std::int64_t v = 0; v < n; ++v)
-          sum += weights[at(v)] * static_cast<long double>(view[v * U + u]);
+          sum += static_cast<long double>(weights[at(v)]) * static_cast<long double>(view[v * U + u]);
         row[u] = static_cast<float>(sum);
       }
     }
@@ -139,16 +123,17 @@ ProjectionSet rows_to_verify(ProjectionSet measured, const FieldOptions& field) 
   ParallelGeometry& g = measured.geometry;
   if (g.extension.before > 0 || g.extension.after > 0)
     throw InputError("rows_to_verify: the scan's rows are longer than the detector already");
-  const bool heights = field.preparation.common_heights.value_or(false);
+  const Heights heights = field.preparation.heights.value_or(Heights::as_seen);
   const bool as_seen = g.row_shift.empty() && g.axis_roll_deg == 0;
-  if (heights == as_seen || g.extension.common_heights)
+  if ((heights != Heights::as_seen) == as_seen || g.extension.common_heights || !g.series.none())
     throw InputError(
         "rows_to_verify: heights are not as the certificate says: give the scan's own rows, shifts and roll "
         "of "
         "the axis");
-  if (heights && g.axis_roll_deg != 0) to_upright_rows(measured);
-  else if (heights) to_common_heights(measured);
-  measured.report.preparation.common_heights = field.preparation.common_heights;
+  if (heights == Heights::all) to_all_heights(measured, half);
+  else if (g.axis_roll_deg != 0) to_upright_rows(measured);
+  else if (heights == Heights::common) to_common_heights(measured);
+  measured.report.preparation.heights = field.preparation.heights;
   measured.report.preparation.half_acquisition = field.preparation.half_acquisition;
   measured.report.preparation.padding = padding;
   g.extension.half_acquisition = field.preparation.half_acquisition;
@@ -170,7 +155,8 @@ ProjectionSet rows_to_verify(ProjectionSet measured, const FieldOptions& field) 
     }
   });
   measured.data = std::move(longer);
-  g.extension = {field.preparation.half_acquisition, padding, row.before, row.after, g.center, heights, cut};
+  g.extension = {field.preparation.half_acquisition, padding, row.before, row.after, g.center,
+                 heights == Heights::common,         cut};
   g.columns = wide;
   g.center += static_cast<double>(row.before);
   return measured;

@@ -48,6 +48,19 @@ constexpr std::optional<Padding> padding_of(std::string_view text) {
   return {};
 }
 
+/// Which heights rows are brought to, of views that saw the sample at other heights: none, those that all
+/// views see, or all that are seen from every direction (docs/geometry.md, "Shifts by view").
+enum class Heights { as_seen, common, all };
+constexpr const char* text_of(Heights heights) {
+  return heights == Heights::all ? "all" : heights == Heights::common ? "common" : "as-seen";
+}
+
+constexpr std::optional<Heights> heights_of(std::string_view text) {
+  for (const Heights h : {Heights::as_seen, Heights::common, Heights::all})
+    if (text == text_of(h)) return h;
+  return {};
+}
+
 /// Steps in the order in which they are done. By default none.
 struct Preparation {
   std::optional<Outliers> outliers;
@@ -64,9 +77,9 @@ struct Preparation {
   /// whether each frame is divided by the beam's current (docs/preparation.md, "Flats in time"). Without a
   /// value: where the files of the scan tell. Recorded as true where it was done, else without a value.
   std::optional<bool> flats_in_time, beam_current;
-  /// Rows of views that saw other heights are brought to those that all see (docs/geometry.md, "Shifts by
-  /// view"). Done without a value too; false leaves it to whoever reads the scan. Recorded as true.
-  std::optional<bool> common_heights;
+  /// Without a value common heights, or all where views share fewer than half of their rows and more are
+  /// covered so; `as_seen` leaves it to whoever reads the scan. Recorded where rows were moved.
+  std::optional<Heights> heights;
 
   [[nodiscard]] bool none() const { return *this == Preparation{}; }
   bool operator==(const Preparation&) const = default;

@@ -35,6 +35,20 @@ struct RowExtension {
   bool operator==(const RowExtension&) const = default;
 };
 
+/// Views that saw the sample at other heights and became a scan of all heights
+/// (host/scan/prepare/series_of_heights.hpp): how they were measured. With d_k = row_shift[k] height n lies
+/// at row n - d_0 + d_k of view k.
+struct HeightSeries {
+  std::int64_t rows = 0;                     ///< of the detector; 0: no series
+  std::int64_t first = 0;                    ///< the height of the scan's first row
+  bool full_turn = false;                    ///< opposite views do not see the same: of half acquisition
+  std::vector<double> theta_rad, row_shift;  ///< by measured view
+  std::vector<double> column_shift;          ///< the same, or empty
+
+  [[nodiscard]] bool none() const { return rows == 0; }
+  bool operator==(const HeightSeries&) const = default;
+};
+
 struct ParallelGeometry {
   std::int64_t columns = 0;  ///< U
   std::int64_t rows = 0;     ///< V
@@ -53,6 +67,8 @@ struct ParallelGeometry {
   /// Of the axis against the detector's columns, in its plane: at higher rows a positive roll has the axis at
   /// higher columns. Where `extension` says that rows are upright, everything else here is of these rows.
   double axis_roll_deg = 0;
+  /// Of a series of heights; `theta_rad` and `rows` are then those that it became, and no row is shifted.
+  HeightSeries series{};
 
   [[nodiscard]] double center_of_view(std::size_t k) const {
     return column_shift.empty() ? center : center + column_shift[k];

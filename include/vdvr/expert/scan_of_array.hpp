@@ -23,6 +23,7 @@ struct ArrayScan {
   std::optional<double> center;          ///< column of the axis; none: found from the views, else the middle
   std::optional<bool> half_acquisition;  ///< none: as axis and arc say
   Padding padding = Padding::none;
+  std::optional<Heights> heights;  ///< of shifted rows; none: as views share them
   /// By view how far the sample stood towards higher columns and rows, in `unit`; empty: it only turned.
   std::vector<std::array<double, 2>> shifts{};
   double axis_roll_deg = 0;  ///< of the axis in the detector's plane; ParallelGeometry says which way

@@ -1,7 +1,7 @@
 // Nikon's .xtekct: an INI file of section XTekCT. It does not say which way the object turns nor which way
 // its offsets point, and programs that read it differ. What is assumed here is what CIL assumes, and is
 // noted.
-#include "host/scan/geometry/nikon_geometry.hpp"
+#include "host/scan/open/nikon_geometry.hpp"
 
 #include <fmt/format.h>
 

@@ -1,6 +1,6 @@
 // RTK's geometry: nine parameters a view, in degrees and one unit of length, and the matrix they make. RTK's
 // axis of rotation is y: its (x, y, z) is our (x, z, -y).
-#include "host/scan/geometry/rtk_geometry.hpp"
+#include "host/scan/open/rtk_geometry.hpp"
 
 #include <fmt/format.h>
 

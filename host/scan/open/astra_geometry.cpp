@@ -1,6 +1,6 @@
 // ASTRA's dictionaries. Its world has the axis of rotation along z, its rows run along +z, and at angle 0 the
 // source lies at -y: as ours. Its detector is centred on the ray through the axis.
-#include "host/scan/geometry/astra_geometry.hpp"
+#include "host/scan/open/astra_geometry.hpp"
 
 #include <fmt/format.h>
 

@@ -1,5 +1,5 @@
 // Matrices as they are: world to column and row, whose centres are integers; see matrix_geometry.hpp.
-#include "host/scan/geometry/matrix_geometry.hpp"
+#include "host/scan/open/matrix_geometry.hpp"
 
 #include <fmt/format.h>
 

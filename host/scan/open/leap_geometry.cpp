@@ -1,7 +1,7 @@
 // LEAP's members by the names of its Python arguments, lengths in mm, `phis` in degrees. LEAP takes 90
 // degrees off `phis`, so that at 0 its source lies at -y, its columns run along +x and its rows along +z: as
 // ours. `tau` moves source and detector together against the columns.
-#include "host/scan/geometry/leap_geometry.hpp"
+#include "host/scan/open/leap_geometry.hpp"
 
 #include <fmt/format.h>
 
@@ -16,7 +16,7 @@
 namespace vdvr::io {
 namespace {
 
-const std::set<std::string> known_members{
+const std::set<std::string> members_of_leap{
     "geometry",      "numAngles",       "numRows",   "numCols",      "pixelHeight", "pixelWidth",
     "centerRow",     "centerCol",       "phis",      "angularRange", "sod",         "sdd",
     "tau",           "helicalPitch",    "tiltAngle", "detectorType", "rowVectors",  "colVectors",
@@ -123,7 +123,7 @@ void modular_views(const Description& about, const std::string& where, const Sta
 }  // namespace
 
 ConeViews leap_geometry(const std::filesystem::path& path, const StackShape& stack) {
-  const Description about(path, known_members);
+  const Description about(path, members_of_leap);
   const std::string where = path.string();
   const bool modular = is_modular(about);
   require_detector(where, about.integer("numCols"), about.integer("numRows"), stack);

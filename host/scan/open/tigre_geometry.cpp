@@ -1,7 +1,7 @@
 // TIGRE's members by its Python names, pairs in the order v, u. At angle 0 its source lies at +x, its columns
 // run along +y and its stored rows along +z: our view at 90 degrees. `COR` moves source and detector together
 // along the columns.
-#include "host/scan/geometry/tigre_geometry.hpp"
+#include "host/scan/open/tigre_geometry.hpp"
 
 #include <fmt/format.h>
 

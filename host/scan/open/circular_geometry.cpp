@@ -1,6 +1,6 @@
 // Circular scans as scan.json describes them (docs/inputs.md, "Cone beam"). Angles and signs are RTK's
 // gantry, in-plane and out-of-plane angles, and its projection offsets.
-#include "host/scan/geometry/circular_geometry.hpp"
+#include "host/scan/open/circular_geometry.hpp"
 
 #include <fmt/format.h>
 

@@ -2,7 +2,7 @@
 // detector stand and the object turns by +angle about the axis, so that in the object's frame, which is ours,
 // they turn by -(initial_angle + angle): its plugin for ASTRA does the same. With the default directions its
 // detector is our view at angle 0.
-#include "host/scan/geometry/cil_geometry.hpp"
+#include "host/scan/open/cil_geometry.hpp"
 
 #include <fmt/format.h>
 

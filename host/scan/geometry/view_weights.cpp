@@ -1,5 +1,5 @@
 // Angular weights from the gaps between directions modulo pi or 2 pi.
-#include "host/field/fbp/view_weights.hpp"
+#include "host/scan/geometry/view_weights.hpp"
 
 #include <fmt/format.h>
 
