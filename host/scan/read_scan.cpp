@@ -328,6 +328,27 @@ void try_to_read(const fs::path& path, const ScanOptions& options, Wanted wanted
     io::read_in_child(path, options.max_memory_bytes, [&] { read_frames(path, options, wanted); });
 }
 
+// Weights of a series depend on whether it is one, and where the axis is, its rows tell.
+bool is_series_of_half_acquisition(const ParallelGeometry& g, const Preparation& wanted) {
+  return !g.series.none() && !g.series.full_turn && !wanted.half_acquisition && g.column_shift.empty() &&
+         looks_half_acquired(g);
+}
+
+ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const Progress& progress,
+                         Understood& understood);
+
+ProjectionSet read_series_of_half_acquisition(const fs::path& path, ScanOptions options,
+                                              const Progress& progress, Understood& understood) {
+  options.preparation.half_acquisition = true;
+  understood = {};
+  ProjectionSet scan = read_whole(path, options, progress, understood);
+  understood.warnings.emplace_back(
+      "half acquisition: the axis is off the middle of a scan all around, so that opposite views of the series "
+      "are taken as rows of a wider detector; `half_acquisition` off says otherwise");
+  scan.report.notes.insert(scan.report.notes.begin(), understood.warnings.back());
+  return scan;
+}
+
 ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const Progress& progress,
                          Understood& understood) {
   try_to_read(path, options, Wanted::all);
@@ -373,6 +394,8 @@ ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const
   prepare_scan(scan, scan.report.preparation, options.max_memory_bytes, progress);
   bring_rows_to_heights(path, raw, options, scan);
   if (!raw.cone) choose_center(path, raw, options, scan);
+  if (is_series_of_half_acquisition(scan.geometry, wanted_of(raw, options)))
+    return read_series_of_half_acquisition(path, options, progress, understood);
   extend(path, raw, options, scan, understood);
   return scan;
 }

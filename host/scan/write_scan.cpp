@@ -39,8 +39,8 @@ void require_samples(const fs::path& path, const ProjectionSet& scan) {
 void require_no_series(const fs::path& path, const ParallelGeometry& g) {
   if (!g.series.none())
     throw InputError(path.string() +
-                     ": rows of a series of heights are weighted by height, which no file says; its own "
-                     "file has the projections as they were measured");
+                     ": rows of a series of heights are weighted by height, which no file says; write the "
+                     "projections as they were measured");
 }
 
 // What says where the samples of /exchange/data lie.

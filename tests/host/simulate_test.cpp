@@ -404,7 +404,11 @@ BOOST_AUTO_TEST_CASE(unusable_options_are_refused) {
   };
   refused([](SimulateOptions& o) { o.angles = 0; });
   refused([](SimulateOptions& o) { o.arc_deg = 0; });
-  refused([](SimulateOptions& o) { o.arc_deg = 361; });
+  refused([](SimulateOptions& o) { o.arc_deg = 360001; });
+  refused([](SimulateOptions& o) {
+    o.arc_deg = 361;
+    o.cone = ConeSetup{.source_to_axis = 100, .source_to_detector = 150};
+  });
   refused([](SimulateOptions& o) { o.columns = 0; });
   refused([](SimulateOptions& o) { o.rows = -3; });
   refused([](SimulateOptions& o) { o.pitch_u = 0; });

@@ -135,7 +135,10 @@ WeightsByHeight::WeightsByHeight(const HeightSeries& series)
   join_views();
 
   std::vector<Height> height(at(heights_));
-  parallel_for(heights_, {}, "", [&](std::int64_t i) { height[at(i)] = look(first_ + i); });
+  parallel_for(heights_, {}, "", [&](std::int64_t i) {
+    height[at(i)] = look(first_ + i);
+    height[at(i)].views = {};  // of thousands of heights
+  });
   std::vector<double> widest;
   for (const Height& h : height)
     if (h.all_around) widest.push_back(h.widest_rad);

@@ -60,7 +60,7 @@ void split(const std::string& line, const char* between, std::vector<std::string
 
 std::vector<double> read_numbers(const std::filesystem::path& path) {
   constexpr std::uintmax_t most = 256u << 20;
-  std::istringstream file(read_text(path, "the file of angles", most));
+  std::istringstream file(read_text(path, "the file of numbers", most));
   std::vector<double> values;
   std::vector<std::string> all;
   std::string line;

@@ -1,5 +1,5 @@
 """NXtomo files that say where the sample was. Right: a sample that stands still, but for noise far below a pixel, is read; a
-helix and a series of heights, whose views share no height, are refused, and the part at rest is named; random shifts are followed,
+helix and a series of heights that no direction sees whole are refused, and the part at rest is named; random shifts are followed,
 and said (shifts.py has them by value); motion along the beam is refused."""
 import h5py
 import numpy as np
@@ -32,7 +32,7 @@ def check(program):
         found = program.views(f'{scan}.nx', VIEWS)
         program.expect(not any('shifts' in w for w in found['understood']['warnings']), f'{scan}: taken to move')
     for scan in ('helix', 'heights'):
-        program.refused('info', f'{scan}.nx', names=['moves by', 'rows', 'share no height', '--views'])
+        program.refused('info', f'{scan}.nx', names=['moves by', 'rows', 'seen from every direction', '--views'])
     program.refused('info', 'along.nx', names=['y_translation', 'moves', 'pixels'])
     found = program.views('shifts.nx', VIEWS)
     program.expect(any('shifts' in w and 'columns' in w for w in found['understood']['warnings']), 'shifts.nx: not said')

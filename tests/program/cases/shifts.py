@@ -86,7 +86,7 @@ def check(program):
     found = program.info('heights.nx')
     program.expect(found['geometry']['rows'] == ROWS - 3, f"heights.nx: {found['geometry']['rows']} rows")
     program.notes(found, 'common heights', f'of {ROWS} rows {ROWS - 3}')
-    program.refused('info', 'helix.nx', names=['share no height', '--views'])
+    program.refused('info', 'helix.nx', names=['none of', 'seen from every direction', '--views'])
     for scan, *options in (('plain.h5', '--shifts', 'shifts.txt'), ('heights.nx',)):
         program.ok('build', scan, '--epsilon', '10%', '-o', 'v.vdvr', '--force', '--quiet', '--size', '10x10x1', *options)
         said = json.loads(program.ok('verify', 'v.vdvr', '--projections', scan, '--exhaustive', '--json', '--quiet', *options))
