@@ -226,6 +226,28 @@ BOOST_AUTO_TEST_CASE(integrals_that_are_no_logarithms_have_one_variance) {
   }
 }
 
+// Noise of one variance where p goes to 12, e^p to 160,000: as counts the sources differ by far more
+// than 1.5.
+BOOST_AUTO_TEST_CASE(noise_that_does_not_grow_with_the_integral_is_none_of_counts) {
+  ProjectionSet scan = ideal_scan({"smooth", 128, 6, 128});
+  const float largest = *std::max_element(scan.data.begin(), scan.data.end());
+  constexpr double sigma = 0.05;
+  std::mt19937 random(6);
+  std::normal_distribution<double> normal(0, sigma);
+  for (float& p : scan.data) p = static_cast<float>(12 * static_cast<double>(p / largest) + normal(random));
+  const auto found = scan_noise(scan);
+  BOOST_TEST_REQUIRE(found.has_value());
+  BOOST_TEST_INFO(found->words);
+  BOOST_TEST(found->agreed);
+  // As of integrals that are no logarithms: 10 % of the photons are 5 % of sigma.
+  BOOST_TEST(std::abs(std::sqrt(found->model.constant) / sigma - 1) <= 0.05);
+  BOOST_TEST(found->model.photon.empty());
+  // And counts stay counts.
+  const auto of_counts = scan_noise(counted(ideal_scan({"smooth", 128, 6, 128}), 3000, 4));
+  BOOST_TEST_REQUIRE(of_counts.has_value());
+  BOOST_TEST(of_counts->model.photons > 0);
+}
+
 // Weights multiply variances by their squares; padded samples, copies of others, are left out.
 BOOST_AUTO_TEST_CASE(sigma_of_longer_rows_is_the_spread_of_repeated_scans) {
   constexpr double photons = 5000;

@@ -99,9 +99,10 @@ struct Best {
   }
 };
 
-// Of line integrals in whatever unit, with the same variance everywhere.
+// Of line integrals in whatever unit, with the same variance everywhere; `whose` says why.
 template <class None>
-std::optional<ScanNoise> of_other_integrals(const ProjectionSet& scan, const None& none) {
+std::optional<ScanNoise> of_other_integrals(const ProjectionSet& scan, const std::string& whose,
+                                            const None& none) {
   const auto by_differences = photons_by_differences(scan, Integrals::others),
              by_wedge = photons_by_wedge(scan, Integrals::others);
   const Best best(by_differences, by_wedge);
@@ -119,9 +120,9 @@ std::optional<ScanNoise> of_other_integrals(const ProjectionSet& scan, const Non
     return inverse ? fmt::format("{:.4g}", 1 / std::sqrt(*inverse)) : "none";
   };
   out.words = fmt::format(
-      "line integrals with a standard deviation of {:.4g} (they are no logarithms of counts: the largest is "
-      "{:.3g}) from the projections alone: {} by second differences, {} by the sinogram's empty wedge",
-      sigma, largest, text(by_differences), text(by_wedge));
+      "line integrals with a standard deviation of {:.4g} ({}) from the projections alone: {} by second "
+      "differences, {} by the sinogram's empty wedge",
+      sigma, whose, text(by_differences), text(by_wedge));
   return out;
 }
 
@@ -148,7 +149,9 @@ std::optional<ScanNoise> scan_noise(const ProjectionSet& scan, const NoiseOption
     return none(
         "the projections were prepared, which changes what their noise looks like; state the noise of the "
         "unprepared ones by `photons`");
-  if (!by_flats && !are_logarithms(scan)) return of_other_integrals(scan, none);
+  if (!by_flats && !are_logarithms(scan))
+    return of_other_integrals(
+        scan, fmt::format("they are no logarithms of counts: the largest is {:.3g}", largest_of(scan)), none);
   ScanNoise out;
   out.by_differences = photons_by_differences(scan);
   out.by_wedge = photons_by_wedge(scan);
@@ -163,6 +166,15 @@ std::optional<ScanNoise> scan_noise(const ProjectionSet& scan, const NoiseOption
         *out.by_flats, photons_text(best.photons));
   } else {
     if (!best.photons) return none(too_little);
+    // Noise that does not grow with the line integral is not of counts: the sources then agree without it.
+    if (!best.agreed)
+      if (auto same =
+              of_other_integrals(scan,
+                                 fmt::format("as counts the sources would say {} and {} photons",
+                                             photons_text(out.by_differences), photons_text(out.by_wedge)),
+                                 [](const std::string&) { return std::optional<ScanNoise>(); });
+          same && same->agreed)
+        return same;
     out.model = of_photons(*best.photons, best.source);
     out.agreed = best.agreed;
     out.words = fmt::format(
