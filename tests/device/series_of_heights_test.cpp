@@ -316,6 +316,7 @@ BOOST_AUTO_TEST_CASE(heights_that_cannot_be_put_together_are_refused) {
   };
   BOOST_TEST(refusal(of_balls(stands(2, 20, pi, 14), 11)).find("what lies between is not") !=
              std::string::npos);
+  BOOST_TEST(refusal(of_balls(helix(120, 2, 4e9), 11)).find("cannot see them all") != std::string::npos);
   BOOST_TEST(refusal(of_balls(helix(120, 2, 40), 11)).find("heights is seen from every direction") !=
              std::string::npos);
   ProjectionSet leaning = of_balls(stands(2, 20, pi, 7), 11);

@@ -9,14 +9,17 @@
 #include <numbers>
 #include <numeric>
 #include <optional>
+#include <span>
 
+#include "host/base/system/ordered_product.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/base/system/wide.hpp"
 #include "host/field/fbp/coverage.hpp"
 #include "host/field/fbp/ramp_kernel.hpp"
-#include "host/scan/geometry/view_weights.hpp"
 #include "host/field/fdk/cone_coverage.hpp"
 #include "host/field/fdk/fdk_weights.hpp"
 #include "host/field/fdk/filter_cone.hpp"
+#include "host/scan/geometry/view_weights.hpp"
 #include "vdvr/expert/reconstruct.hpp"
 
 namespace vdvr {
@@ -34,7 +37,7 @@ std::vector<double> cosine_table(std::int64_t n) {
   return table;
 }
 
-double absolute_sum(const std::vector<double>& values) {
+double absolute_sum(std::span<const double> values) {
   return std::accumulate(values.begin(), values.end(), 0.0,
                          [](double s, double x) { return s + std::abs(x); });
 }
@@ -52,6 +55,24 @@ double cosine_sum(const double* a, std::int64_t n, double x) {
     b1 = b0;
   }
   return a[0] + 0.5 * c * b1 - b2;
+}
+
+// [i][m] of table[m][i].
+std::vector<double> transposed(const std::vector<double>& table, std::int64_t n) {
+  std::vector<double> out(table.size());
+  for (std::int64_t m = 0; m < n; ++m)
+    for (std::int64_t i = 0; i < n; ++i)
+      out[static_cast<std::size_t>(i * n + m)] = table[static_cast<std::size_t>(m * n + i)];
+  return out;
+}
+
+// q[i] = sum over j of p[j] kernel[n - 1 + i - j]: sums side by side over i.
+VDVR_WIDE void convolve(const double* p, const double* kernel, std::int64_t n, double* q) {
+  std::fill(q, q + n, 0.0);
+  for (std::int64_t j = 0; j < n; ++j) {
+    const double sample = p[j], *shifted = kernel + (n - 1 - j);
+    for (std::int64_t i = 0; i < n; ++i) q[i] += shifted[i] * sample;
+  }
 }
 
 // n zeros, in memory or in scratch.
@@ -109,8 +130,9 @@ ExactField::ExactField(const ProjectionSet& scan, const FieldOptions& field, con
   }
   const std::int64_t U = geometry_.columns, V = geometry_.rows, K = geometry_.views();
   const auto g = ramp_kernel(field, scan.cone ? 1.0 : geometry_.pitch_u, U);
-  const auto cos_u = cosine_table(U), cos_v = cosine_table(V);
+  const auto cos_v = cosine_table(V);
   const auto at = [](std::int64_t i) { return static_cast<std::size_t>(i); };
+  const OrderedFactor cos_u(transposed(cosine_table(U), U).data(), U, U);
   std::vector<double> mirrored(at(2 * U - 1));  // [U - 1 + i - j]: the kernel at i - j
   for (std::int64_t i = 0; i < 2 * U - 1; ++i) mirrored[at(i)] = g[at(std::abs(i - (U - 1)))];
   const std::shared_ptr<double[]> coefficients = zeros(at(K * U * V), scan.data.scratch());
@@ -118,35 +140,28 @@ ExactField::ExactField(const ProjectionSet& scan, const FieldOptions& field, con
                                              [](double s, double x) { return s + std::abs(x); });
   std::vector<double> rounding(at(K));
   parallel_for(K, progress, "exact field", [&](std::int64_t k) {
-    double largest_sample = 0, row_norm = 0, rows_norm = 0, norm = 0;
-    std::vector<double> rows(at(V * U));  // [v][m]: cosine coefficients in u
-    std::vector<double> q(at(U));
-    const std::vector<double> p = views.samples(k);
+    double row_norm = 0, norm = 0;
+    std::vector<double> filtered(at(V * U)), rows(at(V * U));  // [v][i]; [v][m]: cosine coefficients in u
+    std::vector<double> p = views.samples(k);
+    for (double& sample : p) sample *= views.weight[at(k)];
+    double largest_sample = 0;
+    for (const double sample : p) largest_sample = std::max(largest_sample, std::abs(sample));
     for (std::int64_t v = 0; v < V; ++v) {
-      // Sums side by side over i: they vectorise where a sum over j would not.
-      std::fill(q.begin(), q.end(), 0.0);
-      for (std::int64_t j = 0; j < U; ++j) {
-        const double sample = p[at(v * U + j)] * views.weight[at(k)];
-        const double* shifted = mirrored.data() + (U - 1 - j);
-        for (std::int64_t i = 0; i < U; ++i) q[at(i)] += shifted[i] * sample;
-        largest_sample = std::max(largest_sample, std::abs(sample));
-      }
-      row_norm = std::max(row_norm, absolute_sum(q));
-      for (std::int64_t m = 0; m < U; ++m) {
-        double sum = 0;
-        for (std::int64_t i = 0; i < U; ++i) sum += q[at(i)] * cos_u[at(m * U + i)];
-        rows[at(v * U + m)] = sum * (m == 0 ? 1.0 : 2.0) / static_cast<double>(U);
-      }
+      double* q = filtered.data() + v * U;
+      convolve(p.data() + v * U, mirrored.data(), U, q);
+      row_norm = std::max(row_norm, absolute_sum(std::span<const double>(q, at(U))));
     }
+    cos_u.product(filtered.data(), V, rows.data());
+    for (std::int64_t i = 0; i < V * U; ++i)
+      rows[at(i)] = rows[at(i)] * (i % U == 0 ? 1.0 : 2.0) / static_cast<double>(U);
+    const double rows_norm = absolute_sum(rows);
+    OrderedFactor(rows.data(), V, U).product(cos_v.data(), V, filtered.data());  // [l][m]
     for (std::int64_t m = 0; m < U; ++m)
       for (std::int64_t l = 0; l < V; ++l) {
-        double sum = 0;
-        for (std::int64_t v = 0; v < V; ++v) sum += rows[at(v * U + m)] * cos_v[at(l * V + v)];
-        const double a = sum * (l == 0 ? 1.0 : 2.0) / static_cast<double>(V);
+        const double a = filtered[at(l * U + m)] * (l == 0 ? 1.0 : 2.0) / static_cast<double>(V);
         coefficients[(k * U + m) * V + l] = a;
         norm += std::abs(a);
       }
-    rows_norm = absolute_sum(rows);
     // docs/error-bounds.md, "What verify does": convolution, both transforms, and sums over coefficients.
     const auto u = static_cast<double>(U), v = static_cast<double>(V);
     rounding[at(k)] = 0x1p-53 * ((u + 8) * kernel_norm * largest_sample * growth(U) * growth(V) +

@@ -302,7 +302,7 @@ double squares_of_rows(double place, std::int64_t rows) {
 
 double SampleVariance::of_series(std::int64_t view, std::int64_t row, std::int64_t column, double sum) const {
   const std::int64_t height = first_ + row;
-  const double shares = series_->shares(view, height).sum;
+  const double shares = series_->shares(view, height);
   if (!(shares > 0)) return 0;
   double v = 0;
   for (const std::int64_t k : series_->measured(view))

@@ -17,7 +17,7 @@ class SeenRows {
   explicit SeenRows(const ProjectionSet& scan) : g_(scan.geometry), weights_(g_.series) {}
 
   [[nodiscard]] double share(std::int64_t view, std::int64_t row) const {
-    return weights_.shares(view, g_.series.first + row).sum;
+    return weights_.shares(view, g_.series.first + row);
   }
   [[nodiscard]] std::vector<std::int64_t> views(std::int64_t first, std::int64_t rows) const {
     std::vector<std::int64_t> out;

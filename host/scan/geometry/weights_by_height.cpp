@@ -1,6 +1,8 @@
 // W_k by taking views away in the order of their tau: a direction's weight changes with its neighbours alone.
 #include "host/scan/geometry/weights_by_height.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -12,6 +14,7 @@
 #include "host/base/system/parallel.hpp"
 #include "host/scan/geometry/angular_gaps.hpp"
 #include "host/scan/geometry/view_weights.hpp"
+#include "vdvr/error.hpp"
 
 namespace vdvr {
 namespace {
@@ -119,6 +122,11 @@ class WeighedDirections {
 WeightsByHeight::WeightsByHeight(const HeightSeries& series)
     : series_(series), period_(series.full_turn ? 2 * pi : pi) {
   const std::int64_t K = std::ssize(series.theta_rad), V = series.rows;
+  const auto [least, most_shift] = std::minmax_element(series.row_shift.begin(), series.row_shift.end());
+  if (!(*most_shift - *least <= static_cast<double>(K * V)))
+    throw InputError(
+        fmt::format("heights: the sample moves by {:.4g} rows, and {} views of {} rows cannot see them all",
+                    *most_shift - *least, K, V));
   for (std::int64_t k = 0; k < K; ++k) {
     const double at_zero = place(k, 0);
     window_.push_back({static_cast<std::int64_t>(std::ceil(-at_zero - hit)),
@@ -189,14 +197,10 @@ double WeightsByHeight::share(std::int64_t view, std::int64_t height) const {
   return share_[at(view * series_.rows + height - w.first)];
 }
 
-WeightsByHeight::Shares WeightsByHeight::shares(std::int64_t view, std::int64_t height) const {
-  Shares out;
-  for (const std::int64_t k : measured(view)) {
-    const double c = share(k, height);
-    out.sum += c;
-    out.squares += c * c;
-  }
-  return out;
+double WeightsByHeight::shares(std::int64_t view, std::int64_t height) const {
+  double sum = 0;
+  for (const std::int64_t k : measured(view)) sum += share(k, height);
+  return sum;
 }
 
 WeightsByHeight::Height WeightsByHeight::look(std::int64_t height) const {

@@ -32,8 +32,9 @@ inline constexpr double same_direction_rad = 2e-6;
 
 class WeightsByHeight {
  public:
-  /// Of `series`: angles, shifts, rows and full_turn. Cost: heights * views * log(views); memory: 8 bytes a
-  /// measured row of a view.
+  /// Of `series`: angles, shifts, rows and full_turn. Throws InputError for shifts beyond the rows of all
+  /// views together, which leave heights that none sees. Cost: heights * views * log(views); memory: 8 bytes
+  /// a measured row of a view.
   explicit WeightsByHeight(const HeightSeries& series);
 
   /// Angles of the views that the series becomes, and the measured ones that each is a sum of.
@@ -43,11 +44,8 @@ class WeightsByHeight {
   [[nodiscard]] double place(std::int64_t view, std::int64_t height) const;
   /// W / w of a measured view; 0 where it has no row.
   [[nodiscard]] double share(std::int64_t view, std::int64_t height) const;
-  /// The sum of shares of a view that the series becomes, and the one of their squares.
-  struct Shares {
-    double sum = 0, squares = 0;
-  };
-  [[nodiscard]] Shares shares(std::int64_t view, std::int64_t height) const;
+  /// Their sum over the measured views of one that the series becomes.
+  [[nodiscard]] double shares(std::int64_t view, std::int64_t height) const;
 
   struct Run {
     std::int64_t first = 0, count = 0;
@@ -62,7 +60,6 @@ class WeightsByHeight {
     std::int64_t first, last;  ///< heights
   };
   struct Height;
-  void find_directions(double period);
   void join_views();
   [[nodiscard]] Height look(std::int64_t height) const;
   void set_shares(std::int64_t height, const std::vector<double>& w);

@@ -45,8 +45,8 @@ std::vector<double> row_weights_at(std::int64_t rows, double place) {
 
 std::int64_t count_of_common_heights(const ParallelGeometry& g) {
   const auto [least, most] = std::minmax_element(g.row_shift.begin(), g.row_shift.end());
-  return std::max<std::int64_t>(
-      0, static_cast<std::int64_t>(std::floor(static_cast<double>(g.rows) - (*most - *least) + hit)));
+  return static_cast<std::int64_t>(
+      std::max(0.0, std::floor(static_cast<double>(g.rows) - (*most - *least) + hit)));
 }
 
 void common_heights(ProjectionSet& scan, std::uint64_t max_memory_bytes,

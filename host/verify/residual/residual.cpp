@@ -104,7 +104,7 @@ Residual residual(const ProjectionSet& scan, const MixedVolume& volume, const Ce
     parallel_for(g.views(), {}, "residual", [&](std::int64_t view) {
       const double c = std::cos(g.theta_rad[static_cast<std::size_t>(view)]),
                    s = std::sin(g.theta_rad[static_cast<std::size_t>(view)]),
-                   shares = series ? series->shares(view, longer.series.first + row).sum : 1;
+                   shares = series ? series->shares(view, longer.series.first + row) : 1;
       if (!(shares > 0)) return;  // which did not see that height
       for (std::int64_t i = 0; i < g.columns; ++i) {
         const std::int64_t column = i + longer.extension.before;

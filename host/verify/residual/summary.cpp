@@ -60,7 +60,7 @@ ResidualSummary summary_of(const Residual& r, const ProjectionSet& scan) {
   double measured_square = 0, edge = 0, largest = 0;
   for (std::int64_t k = 0; k < g.views(); ++k)
     for (std::int64_t v = r.first_row; v < r.first_row + r.rows; ++v) {
-      const double shares = series ? series->shares(k, of.first + v).sum : 1;
+      const double shares = series ? series->shares(k, of.first + v) : 1;
       if (!(shares > 0)) continue;  // the view did not see that height
       for (std::int64_t i = 0; i < g.columns; ++i) {
         const std::size_t at = r.index(k, v, i);

@@ -139,6 +139,9 @@ struct Range {
 };
 
 Range covered(const HeightsToVerify& heights, const ParallelGeometry& g) {
+  const auto [least, most_shift] = std::minmax_element(g.row_shift.begin(), g.row_shift.end());
+  if (!(*most_shift - *least <= static_cast<double>(g.views() * g.rows)))
+    throw InputError("rows_to_verify: the sample moves by more rows than all views have");
   std::int64_t low = INT64_MAX, high = INT64_MIN;
   for (std::size_t k = 0; k < g.theta_rad.size(); ++k) {
     const long double row_of_zero = heights.place(k, 0);
