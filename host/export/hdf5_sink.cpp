@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "host/base/system/length_unit.hpp"
+#include "host/files/io/length_unit.hpp"
 #include "host/base/system/limits.hpp"
 #include "host/base/system/parallel.hpp"
 #include "host/export/pack.hpp"

@@ -1,7 +1,7 @@
 #define BOOST_TEST_MODULE read_scan
 #include "vdvr/read_scan.hpp"
 
-#include "host/base/system/length_unit.hpp"
+#include "host/files/io/length_unit.hpp"
 #include "host/files/io/text_encoding.hpp"
 #include "tests/support/scan_files.hpp"
 #include "vdvr/expert/hash.hpp"

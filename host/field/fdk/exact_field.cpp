@@ -11,7 +11,7 @@
 #include <optional>
 #include <span>
 
-#include "host/base/system/ordered_product.hpp"
+#include "host/field/fdk/ordered_product.hpp"
 #include "host/base/system/parallel.hpp"
 #include "host/base/system/wide.hpp"
 #include "host/field/fbp/coverage.hpp"

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <set>
 
-#include "host/base/system/length_unit.hpp"
+#include "host/files/io/length_unit.hpp"
 #include "host/files/hdf5/hdf5_reader.hpp"
 #include "host/files/io/raster_file.hpp"
 #include "host/files/io/text_encoding.hpp"

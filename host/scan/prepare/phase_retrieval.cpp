@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "host/base/system/length_unit.hpp"
+#include "host/files/io/length_unit.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

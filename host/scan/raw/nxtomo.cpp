@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "host/base/system/length_unit.hpp"
+#include "host/files/io/length_unit.hpp"
 #include "host/files/io/text_encoding.hpp"
 #include "host/scan/raw/nxtomo_beam.hpp"
 #include "vdvr/error.hpp"

@@ -1,4 +1,4 @@
-#include "host/base/system/ordered_product.hpp"
+#include "host/field/fdk/ordered_product.hpp"
 
 #include <algorithm>
 

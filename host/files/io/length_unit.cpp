@@ -1,4 +1,4 @@
-#include "host/base/system/length_unit.hpp"
+#include "host/files/io/length_unit.hpp"
 
 #include <array>
 #include <cstdlib>
