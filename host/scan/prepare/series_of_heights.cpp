@@ -24,20 +24,22 @@ std::string text_of(const Run& run) { return fmt::format("{} to {}", run.first, 
 Run the_run(const WeightsByHeight& weights, const ParallelGeometry& g) {
   const auto& covered = weights.covered();
   const auto [least, most] = std::minmax_element(g.row_shift.begin(), g.row_shift.end());
-  const std::string moves =
-      fmt::format("heights: the sample moves by {:.4g} rows along the axis, of views of {}", *most - *least, g.rows);
+  const std::string moves = fmt::format(
+      "heights: the sample moves by {:.4g} rows along the axis, of views of {}", *most - *least, g.rows);
   if (covered.empty())
-    throw InputError(fmt::format(
-        "{}, and none of {} heights is seen from every direction: it moves by more than the detector's height in "
-        "half a turn, or views are missing; `views` takes a part",
-        moves, weights.seen().count));
+    throw InputError(
+        fmt::format("{}, and none of {} heights is seen from every direction: it moves by more than the "
+                    "detector's height in "
+                    "half a turn, or views are missing; `views` takes a part",
+                    moves, weights.seen().count));
   if (covered.size() == 1) return covered.front();
   std::vector<std::string> runs;
   for (const Run& run : covered) runs.push_back(text_of(run));
-  throw InputError(fmt::format(
-      "{}; counted in rows of the first view, heights {} are seen from every direction, and what lies between is "
-      "not; `views` takes a part",
-      moves, fmt::join(runs, ", and ")));
+  throw InputError(
+      fmt::format("{}; counted in rows of the first view, heights {} are seen from every direction, and what "
+                  "lies between is "
+                  "not; `views` takes a part",
+                  moves, fmt::join(runs, ", and ")));
 }
 
 // One measured view's share of rows of the series, added to double sum[height][column].

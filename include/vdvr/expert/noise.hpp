@@ -48,8 +48,9 @@ struct ScanNoise {
 /// in frequency, parallel beam with even steps alone. Nothing where none can be had, where the projections
 /// were prepared by more than binning, or where more photons are found than detectors count (10^9): such data
 /// were not measured. Line integrals beyond 30, or below 0.01, are no logarithms of counts: they get one
-/// variance for all, and so do those whose estimates agree within 1.5 on that alone. `why` gets one line where there is nothing. Cost: a pass over at most a few million
-/// samples. Throws InputError for numbers that are not positive and finite.
+/// variance for all, and so do those whose estimates agree within 1.5 on that alone. `why` gets one line
+/// where there is nothing. Cost: a pass over at most a few million samples. Throws InputError for numbers
+/// that are not positive and finite.
 VDVR_API std::optional<ScanNoise> scan_noise(const ProjectionSet& scan, const NoiseOptions& options = {},
                                              const std::optional<LineIntegralNoise>& by_flats = {},
                                              std::string* why = nullptr);
