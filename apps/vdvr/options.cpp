@@ -60,9 +60,8 @@ void add_field(Arguments& args) {
              "a full turn about an axis off the middle: opposite views are rows of a wider detector (default "
              "auto: as axis and arc say)")
       .value("heights", "auto|common|all",
-             "of views that saw the sample at other heights: those that all see, or all that are seen from "
-             "every "
-             "direction (default auto: all where views share fewer than half of their rows)")
+             "of views that saw the sample at other heights: those that all see, or all that are seen "
+             "from every direction (default auto: all where views share fewer than half of their rows)")
       .value("pad", "none|edge|mirror",
              "of objects wider than the detector: how rows go on beyond it, tapering to zero (default none)");
 }

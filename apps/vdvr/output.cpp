@@ -9,9 +9,9 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/common/messages.hpp"
-#include "vdvr/expert/extend_rows.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/certify.hpp"
+#include "vdvr/expert/extend_rows.hpp"
 #include "vdvr/expert/preparation.hpp"
 
 namespace fs = std::filesystem;

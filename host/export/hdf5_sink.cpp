@@ -5,11 +5,11 @@
 #include <optional>
 #include <vector>
 
-#include "host/files/io/length_unit.hpp"
 #include "host/base/system/limits.hpp"
 #include "host/base/system/parallel.hpp"
 #include "host/export/pack.hpp"
 #include "host/files/hdf5/hdf5_writer.hpp"
+#include "host/files/io/length_unit.hpp"
 #include "vdvr/expert/output_file.hpp"
 
 namespace vdvr {

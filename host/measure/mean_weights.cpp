@@ -9,8 +9,8 @@
 #include "host/base/system/parallel.hpp"
 #include "host/field/fbp/cosine_series.hpp"
 #include "host/field/fbp/ramp_kernel.hpp"
-#include "host/scan/geometry/view_weights.hpp"
 #include "host/field/fdk/filter_cone.hpp"
+#include "host/scan/geometry/view_weights.hpp"
 
 namespace vdvr::measured {
 namespace {

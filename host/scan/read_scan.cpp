@@ -343,9 +343,8 @@ ProjectionSet read_series_of_half_acquisition(const fs::path& path, ScanOptions 
   understood = {};
   ProjectionSet scan = read_whole(path, options, progress, understood);
   understood.warnings.emplace_back(
-      "half acquisition: the axis is off the middle of a scan all around, so that opposite views of the "
-      "series "
-      "are taken as rows of a wider detector; `half_acquisition` off says otherwise");
+      "half acquisition: the axis is off the middle of a scan all around, so that opposite views "
+      "of the series are taken as rows of a wider detector; `half_acquisition` off says otherwise");
   scan.report.notes.insert(scan.report.notes.begin(), understood.warnings.back());
   return scan;
 }

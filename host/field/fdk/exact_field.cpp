@@ -11,7 +11,6 @@
 #include <optional>
 #include <span>
 
-#include "host/field/fdk/ordered_product.hpp"
 #include "host/base/system/parallel.hpp"
 #include "host/base/system/wide.hpp"
 #include "host/field/fbp/coverage.hpp"
@@ -19,6 +18,7 @@
 #include "host/field/fdk/cone_coverage.hpp"
 #include "host/field/fdk/fdk_weights.hpp"
 #include "host/field/fdk/filter_cone.hpp"
+#include "host/field/fdk/ordered_product.hpp"
 #include "host/scan/geometry/view_weights.hpp"
 #include "vdvr/expert/reconstruct.hpp"
 

@@ -9,8 +9,8 @@
 #include <numbers>
 
 #include "host/base/system/casts.hpp"
-#include "host/scan/geometry/view_weights.hpp"
 #include "host/scan/geometry/vectors.hpp"
+#include "host/scan/geometry/view_weights.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

@@ -8,9 +8,9 @@
 #include <numbers>
 #include <utility>
 
+#include "host/scan/prepare/heights.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/extend_rows.hpp"
-#include "host/scan/prepare/heights.hpp"
 #include "vdvr/expert/find_center.hpp"
 #include "vdvr/expert/hash.hpp"
 #include "vdvr/expert/reconstruct.hpp"

@@ -22,9 +22,9 @@
 #include "host/field/fbp/cosine_series.hpp"
 #include "host/field/fbp/ramp_kernel.hpp"
 #include "host/field/fbp/reconstruct.hpp"
-#include "host/scan/geometry/view_weights.hpp"
 #include "host/field/fdk/filter_cone.hpp"
 #include "host/field/fdk/reconstruct_cone.hpp"
+#include "host/scan/geometry/view_weights.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -34,9 +34,8 @@ namespace {
 constexpr std::int64_t reach = 12, block = 8;
 constexpr std::int64_t rows_together = 16;
 
-double largest_variance(const ProjectionSet& scan, const LineIntegralNoise& noise) {
+double largest_variance(const ProjectionSet& scan, const SampleVariance& variance) {
   const std::int64_t pixels = scan.geometry.rows * scan.geometry.columns;
-  const SampleVariance variance(scan.geometry, noise);
   std::vector<double> largest(at(scan.geometry.views()), 0.0);
   parallel_for(scan.geometry.views(), {}, "", [&](std::int64_t k) {
     for (std::int64_t i = 0; i < pixels; ++i)
@@ -76,11 +75,11 @@ FieldVariance of_parallel(opencl::State& state, const ProjectionSet& scan, const
   FieldVariance out;
   const Index3 n = grid.samples();
   out.samples.assign(at(grid.sample_count()), 0.0f);
-  const double unit = largest_variance(scan, noise) * filter.at(0) * heaviest;
+  const SampleVariance variance(g, noise);
+  const double unit = largest_variance(scan, variance) * filter.at(0) * heaviest;
   out.scale = unit * pitch;
   const std::vector<double> places = detector_rows(g, grid.origin[2], grid.spacing[2], n[2]);
   const UpsampledColumns columns = upsampled_columns(g.columns, 2, 1);
-  const SampleVariance variance(g, noise);
   ColumnBlocks blocks;
   blocks.nx = n[0];
   blocks.ny = n[1];
@@ -139,7 +138,7 @@ FieldVariance of_cone(opencl::State& state, const ProjectionSet& scan, const Fie
   const SquaredFilter filter(field);
   double heaviest = 0;
   for (const double w : frame.of_view) heaviest = std::max(heaviest, w * w);
-  const double unit = largest_variance(scan, noise) * filter.at(0) * heaviest;
+  const double unit = largest_variance(scan, SampleVariance(scan.geometry, noise)) * filter.at(0) * heaviest;
   FieldVariance out;
   out.scale = std::ldexp(unit, -2 * units.across);
   HostMemory host(state);

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <map>
 
+#include "host/base/system/casts.hpp"
+#include "host/base/system/limits.hpp"
 #include "host/field/noise/field_variance.hpp"
 #include "host/field/noise/passed_noise.hpp"
 #include "host/scan/prepare/upright_rows.hpp"
@@ -86,12 +88,8 @@ std::optional<ScanNoise> of_prepared(const std::filesystem::path& path, const Sc
   return found;
 }
 
-}  // namespace
-
-namespace {
-
 // Views of the longest stand at one height; of a helix, which has none, all.
-ProjectionSet one_stand(ProjectionSet seen) {
+ProjectionSet one_stand(ProjectionSet seen, std::uint64_t max_memory_bytes) {
   ParallelGeometry& g = seen.geometry;
   constexpr std::int64_t fewest_views = 16;
   std::map<double, std::int64_t> stands;
@@ -104,6 +102,8 @@ ProjectionSet one_stand(ProjectionSet seen) {
   own.theta_rad.clear();
   own.column_shift.clear();
   own.row_shift.clear();
+  io::require_memory(seen.data.resident_bytes() + count(longest->second * plane) * sizeof(float),
+                     max_memory_bytes, "the noise of a stand");
   std::vector<float> data;
   for (std::int64_t k = 0; k < g.views(); ++k) {
     if (g.row_shift[at(k)] != longest->first) continue;
@@ -125,7 +125,7 @@ std::optional<ScanNoise> of_series(const std::filesystem::path& path, ScanOption
   how.preparation.half_acquisition = false;
   how.preparation.padding = Padding::none;
   if (!how.center) how.center = stated_center({}, scan.geometry);
-  const ProjectionSet seen = one_stand(read_scan(path, how, progress));
+  const ProjectionSet seen = one_stand(read_scan(path, how, progress), how.max_memory_bytes);
   if (seen.report.sha256 != scan.report.sha256)
     throw FileError(path.string() + ": was changed while it was read; start again once it is whole");
   return read_scan_noise(path, how, seen, options, why, progress);

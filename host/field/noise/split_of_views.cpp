@@ -131,8 +131,8 @@ std::vector<int> alternating_signs(const ProjectionSet& scan) {
 std::optional<SplitOfViews> split_of_views(Device& device, const ProjectionSet& scan,
                                            const FieldOptions& field, const LineIntegralNoise& noise,
                                            const Progress& progress) {
-  // Of views that see a part of the heights each no two are neighbours everywhere.
-  if (views_of_rows(scan, 0, 1)) return std::nullopt;
+  // No two of them are neighbours at all of their heights.
+  if (views_see_parts(scan.geometry)) return std::nullopt;
   Middle middle = middle_rows(scan, noise);
   ParallelGeometry& g = middle.scan.geometry;
   const double center = center_of(field, g);

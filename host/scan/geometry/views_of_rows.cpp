@@ -14,7 +14,7 @@ namespace {
 // The sum of shares of each view at each of its rows.
 class SeenRows {
  public:
-  explicit SeenRows(const ProjectionSet& scan) : g_(scan.geometry), weights_(g_.series) {}
+  explicit SeenRows(const ParallelGeometry& g) : g_(g), weights_(g.series) {}
 
   [[nodiscard]] double share(std::int64_t view, std::int64_t row) const {
     return weights_.shares(view, g_.series.first + row);
@@ -62,24 +62,21 @@ ProjectionSet taken(const ProjectionSet& scan, const SeenRows& seen, std::int64_
   return out;
 }
 
-bool is_partial(const ParallelGeometry& g, const SeenRows& seen) {
-  return std::ssize(seen.views(0, g.rows)) < g.views();
-}
-
 }  // namespace
 
+bool views_see_parts(const ParallelGeometry& g) {
+  return !g.series.none() && std::ssize(SeenRows(g).views(0, g.rows)) < g.views();
+}
+
 std::optional<ProjectionSet> views_of_rows(const ProjectionSet& scan, std::int64_t first, std::int64_t rows) {
-  if (scan.geometry.series.none()) return std::nullopt;
-  const SeenRows seen(scan);
-  if (!is_partial(scan.geometry, seen)) return std::nullopt;
-  return taken(scan, seen, first, rows);
+  if (!views_see_parts(scan.geometry)) return std::nullopt;
+  return taken(scan, SeenRows(scan.geometry), first, rows);
 }
 
 std::optional<ProjectionSet> views_of_middle(const ProjectionSet& scan) {
   const ParallelGeometry& g = scan.geometry;
-  if (g.series.none()) return std::nullopt;
-  const SeenRows seen(scan);
-  if (!is_partial(g, seen)) return std::nullopt;
+  if (!views_see_parts(g)) return std::nullopt;
+  const SeenRows seen(g);
   constexpr std::int64_t most_rows = 16;
   std::int64_t rows = std::min(most_rows, g.rows);
   while (rows > 1 && !seen.all_around(seen.views((g.rows - rows) / 2, rows))) rows /= 2;

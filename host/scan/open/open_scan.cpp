@@ -6,13 +6,13 @@
 #include <fstream>
 #include <set>
 
-#include "host/files/io/length_unit.hpp"
 #include "host/files/hdf5/hdf5_reader.hpp"
+#include "host/files/io/length_unit.hpp"
 #include "host/files/io/raster_file.hpp"
 #include "host/files/io/text_encoding.hpp"
 #include "host/scan/open/scan_folder.hpp"
-#include "host/scan/raw/hdf5_scan.hpp"
 #include "host/scan/raw/hdf5_frames.hpp"
+#include "host/scan/raw/hdf5_scan.hpp"
 #include "host/scan/raw/raster_scan.hpp"
 #include "vdvr/error.hpp"
 

@@ -11,8 +11,8 @@
 
 #include "host/files/io/raster_file.hpp"
 #include "host/files/io/tiff.hpp"
-#include "host/scan/open/circular_geometry.hpp"
 #include "host/scan/geometry/description.hpp"
+#include "host/scan/open/circular_geometry.hpp"
 #include "host/scan/open/nikon_geometry.hpp"
 #include "host/scan/open/scan_members.hpp"
 #include "host/scan/raw/hdf5_scan.hpp"

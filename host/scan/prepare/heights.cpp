@@ -18,8 +18,7 @@ void bring_to_heights(ProjectionSet& scan, const Preparation& wanted, std::uint6
     if (wanted.heights == Heights::all)
       throw InputError(
           "heights: all of them are put together of views about an axis that stands upright, and this one "
-          "leans; "
-          "`heights` common takes those that all views see");
+          "leans; `heights` common takes those that all views see");
     return upright_rows(scan, max_memory_bytes, scratch);
   }
   if (g.row_shift.empty()) return;

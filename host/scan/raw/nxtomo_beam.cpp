@@ -9,8 +9,8 @@
 #include <numbers>
 #include <optional>
 
-#include "host/files/io/length_unit.hpp"
 #include "host/base/system/limits.hpp"
+#include "host/files/io/length_unit.hpp"
 #include "host/files/io/text_encoding.hpp"
 #include "vdvr/error.hpp"
 

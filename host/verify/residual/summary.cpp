@@ -3,8 +3,8 @@
 #include <cmath>
 #include <memory>
 
-#include "vdvr/expert/extend_rows.hpp"
 #include "host/scan/geometry/weights_by_height.hpp"
+#include "vdvr/expert/extend_rows.hpp"
 #include "vdvr/expert/residual.hpp"
 
 namespace vdvr {
