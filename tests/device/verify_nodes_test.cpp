@@ -80,7 +80,7 @@ FieldBounds bounds_of(const ExactField& exact, const VerifyNodes& nodes, const V
 /// fewer nodes than gold, and what these err.
 double counted(const NodePath& p) {
   const bool across = p.across > 1, along = !p.rows && p.along > 1;
-  const double L = across ? 1.624 : 1, along_z = along ? 1.624 : 1, d = std::numbers::pi / fine_columns,
+  const double L = across ? 1.624 : 1, along_z = along ? 1.624 : 1, d = std::numbers::pi / p.density,
                column = (4 * p.reach + 6) * d + 27, row = 28 + 1.01 * static_cast<double>(10 + p.calls),
                product = p.rows || along ? 1.01 * 20 : 0;
   const double passes = across || along ? 155 + 13.2 * (1.624 * 1.624 + 1.624) : 0;
@@ -91,8 +91,9 @@ double counted(const NodePath& p) {
 /// F's own mean square's root: its spectrum goes with w, its sixth derivative with w^7, so that the sixth
 /// derivative is (3 / 15)^(1/2) of what a wave at Nyquist has; the product of distances to six points is .71
 /// of its largest. Views err independently of each other, as they are added up in F.
-const double interpolation_of_noise =
-    225.0 / 64 / 720 * std::pow(std::numbers::pi / fine_columns, 6) * std::sqrt(3.0 / 15) * 0.71;
+double interpolation_of_noise(double density) {
+  return 225.0 / 64 / 720 * std::pow(std::numbers::pi / density, 6) * std::sqrt(3.0 / 15) * 0.71;
+}
 
 /// The largest error at a node, as a share of the bound. Every node of the box is looked at.
 double worst_share(opencl::State& state, const ProjectionSet& scan, const Grid& grid,
@@ -136,7 +137,8 @@ double worst_share(opencl::State& state, const ProjectionSet& scan, const Grid& 
     }
     // The largest of many errors is above their mean.
     if (noise)
-      BOOST_TEST(largest >= interpolation_of_noise * std::sqrt(squares / static_cast<double>(F.size())));
+      BOOST_TEST(largest >= interpolation_of_noise(nodes.path(part, rate).density) *
+                                std::sqrt(squares / static_cast<double>(F.size())));
   }
   return worst;
 }

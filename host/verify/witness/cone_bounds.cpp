@@ -179,12 +179,13 @@ void add_nodes(NodeSums& out, const ViewOnBox& v, const Sups& sups, const ConePa
   // (7/2)^2 (5/2)^2 (3/2)^2 (1/2)^2 / 8! of the eighth derivative, and the points along u weigh what those
   // along v err.
   constexpr double product = 43.06640625 / 40320, sum_of_weights = 1.4883;
-  const double each = product * std::pow(1.0 / cone_density, 8) * std::pow(pi, 6);
+  const double along_u = product * std::pow(1 / path.nodes.density_u, 8) * std::pow(pi, 6),
+               along_v = product * std::pow(1.0 / cone_density, 8) * std::pow(pi, 6);
   out.value += v.weight * sups.value;
   out.weight = std::max(out.weight, v.weight);
   out.places += v.weight * (slope(sups.value, sups.second_u) * path.nodes.place_u +
                             slope(sups.value, sups.second_v) * path.nodes.place_v);
-  out.between += v.weight * each * (sups.second_u + sum_of_weights * sups.second_v);
+  out.between += v.weight * (along_u * sups.second_u + sum_of_weights * along_v * sups.second_v);
   for (std::size_t e = 0; e < 3; ++e) {
     const int factor = e < 2 ? path.path.across : path.path.along;
     if (factor > 1) out.along[e] += v.weight * sups.value * lagrange_share(v, sups, e, factor);

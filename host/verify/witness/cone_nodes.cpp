@@ -42,6 +42,12 @@ struct ViewNumbers {
 };
 static_assert(sizeof(ViewNumbers) == 64);
 
+// Where in the table `pixels` from the middle of pixel 0 are: columns lie half a place beside the detector's
+// edge, rows on it.
+double table_place(std::size_t axis, double pixels, double density) {
+  return (pixels + 0.5) * density - (axis == 0 ? 0.5 : 0.0);
+}
+
 std::int64_t up_to(std::int64_t n, std::int64_t multiple) { return (n + multiple - 1) / multiple * multiple; }
 
 // At a point, the frequency along an axis of the fastest wave that a view can add, radians for each unit of
@@ -81,13 +87,16 @@ VerifyConeNodes::VerifyConeNodes(opencl::State& state, const ExactField& field, 
     : state_(state),
       field_(field),
       coverage_(coverage),
+      along_u_(field.geometry().columns, cone_density),
+      density_{static_cast<double>(along_u_.places()) / static_cast<double>(field.geometry().columns),
+               static_cast<double>(cone_density)},
       unit_(unit),
       furthest_(furthest),
       upright_(std::all_of(field.views().begin(), field.views().end(),
                            [](const ViewMatrix& m) { return m[0][2] == 0 && m[2][2] == 0; })) {}
 
-/// Which part of the detector's plane the nodes see, in places of the table: place n lies n / cone_density -
-/// 1/2 pixels from the middle of pixel 0.
+/// Which part of the detector's plane the nodes see, in places of the table. Column n lies (n + 1/2) /
+/// density - 1/2 pixels from the middle of pixel 0, row n at n / density - 1/2.
 struct VerifyConeNodes::Window {
   std::int64_t first_column = 0, columns = 0, first_row = 0, rows = 0;
   double magnitude = 0;  // largest sum of magnitudes of what a place is made of
@@ -95,7 +104,6 @@ struct VerifyConeNodes::Window {
 
 VerifyConeNodes::Window VerifyConeNodes::window_of(const Nodes& wanted,
                                                    const std::vector<cl_int2>& tiles) const {
-  constexpr double density = cone_density;
   Vec3 low{HUGE_VAL, HUGE_VAL, 0}, high{-HUGE_VAL, -HUGE_VAL, 0};
   double magnitude = 0;
   std::mutex lock;
@@ -119,7 +127,7 @@ VerifyConeNodes::Window VerifyConeNodes::window_of(const Nodes& wanted,
           double sum = std::abs(m[a][3]) + std::abs(seen[a] * m[2][3]);
           for (std::size_t e = 0; e < 3; ++e)
             sum += (std::abs(m[a][e]) + std::abs(seen[a] * m[2][e])) * std::abs(p[e]);
-          largest = std::max(largest, density * (sum / std::abs(seen[2]) + 1));
+          largest = std::max(largest, density_[0] * (sum / std::abs(seen[2]) + 1));
         }
         least[2] = std::min(least[2], seen[2]);
       }
@@ -135,12 +143,14 @@ VerifyConeNodes::Window VerifyConeNodes::window_of(const Nodes& wanted,
   });
   // One place more on either side than the points need: fp32 may take the place beside.
   const auto first = [&](std::size_t a) {
-    return static_cast<std::int64_t>(std::floor((low[a] + 0.5) * density)) - points_before - 1;
+    return static_cast<std::int64_t>(std::floor(table_place(a, low[a], density_[a]))) - points_before - 1;
   };
   const auto end = [&](std::size_t a) {
-    return static_cast<std::int64_t>(std::floor((high[a] + 0.5) * density)) + cone_points - points_before + 1;
+    return static_cast<std::int64_t>(std::floor(table_place(a, high[a], density_[a]))) + cone_points -
+           points_before + 1;
   };
-  return {first(0), end(0) - first(0), first(1), up_to(end(1) - first(1), cosine_sums::lanes), magnitude};
+  return {first(0), end(0) - first(0), first(1), up_to(end(1) - first(1), CosineTransform::together),
+          magnitude};
 }
 
 /// Some views at the places of a window, on the host and on the device: [view][column][row].
@@ -170,19 +180,20 @@ struct VerifyConeNodes::Table {
 // Beyond the detector's edges the series is its own mirror image: cosines are even and periodic.
 void VerifyConeNodes::fill(Table& table, std::int64_t first_view) const {
   const ParallelGeometry& g = field_.geometry();
-  const std::int64_t U = g.columns, V = g.rows, last = cone_density * U;
+  const std::int64_t U = g.columns, V = g.rows, all = along_u_.places();
   const Window& window = table.window;
   table.first_view = first_view;
   table.filled = std::min(table.views, g.views() - first_view);
-  const auto cosine_u = cosine_sums::cosine_period(last),
-             cosine_v = cosine_sums::cosine_period(cone_density * V);
+  const auto cosine_v = cosine_sums::cosine_period(cone_density * V);
   const auto mirrored = [&](std::int64_t n) {
-    const std::int64_t m = std::abs(n) % (2 * last);
-    return m > last ? 2 * last - m : m;
+    std::int64_t m = n % (2 * all);
+    if (m < 0) m += 2 * all;
+    return m >= all ? 2 * all - 1 - m : m;
   };
   parallel_for(table.filled, {}, "", [&](std::int64_t k) {
     const double* a = field_.coefficients().data() + (first_view + k) * U * V;
     float* out = table.host.data() + k * table.per_view();
+    std::vector<double> work;
     for (std::int64_t first = 0; first < window.rows; first += most_rows) {
       const std::int64_t rows = std::min(most_rows, window.rows - first);
       std::vector<double> basis(at(V * rows)), line(at(U * rows));
@@ -191,13 +202,9 @@ void VerifyConeNodes::fill(Table& table, std::int64_t first_view) const {
           basis[at(l * rows + r)] =
               cosine_v[at(l * std::abs(window.first_row + first + r) % (2 * cone_density * V))];
       cosine_sums::sum_rows(a, U, V, basis, rows, line);
-      std::vector<float> dense(at((last + 1) * rows));
-      cosine_sums::sum_columns(
-          line, U, rows, cone_density, cosine_u,
-          [&](std::int64_t n, std::int64_t r, const std::array<double, cosine_sums::lanes>& values) {
-            for (std::int64_t i = 0; i < cosine_sums::lanes; ++i)
-              dense[at(n * rows + r + i)] = static_cast<float>(values[at(i)] / unit_);
-          });
+      std::vector<float> dense(at(all * rows));
+      for (std::int64_t r = 0; r < rows; r += CosineTransform::together)
+        along_u_.values(line.data() + r, rows, unit_, dense.data() + r, rows, work);
       for (std::int64_t n = 0; n < window.columns; ++n)
         std::copy_n(dense.data() + mirrored(window.first_column + n) * rows, rows,
                     out + n * window.rows + first);
@@ -252,7 +259,9 @@ ConeNodeFacts VerifyConeNodes::make(const Nodes& wanted, const opencl::DeviceArr
     opencl::finish(state_, "nodes of the field to verify against");  // before the table changes
   }
   const double host = 32 * 0x1p-53 * window.magnitude;
-  for (double* place : {&facts.place_u, &facts.place_v}) *place = (*place + host) / cone_density;
+  facts.density_u = density_[0];
+  facts.place_u = (facts.place_u + host) / density_[0];
+  facts.place_v = (facts.place_v + host) / density_[1];
   return facts;
 }
 
@@ -269,15 +278,15 @@ struct Place {
 // lambda. Numerator: five roundings of each term. Lambda: five, of terms `cancellation` as large as itself;
 // its reciprocal 2.5 units in the last place, the product one. Then the sum with what is left of the middle.
 Place place_of(const ViewMatrix& m, std::size_t axis, const Vec3& seen, const Vec3& spacing,
-               double lambda_min, double cancellation, std::int64_t first) {
+               double lambda_min, double cancellation, std::int64_t first, double density) {
   Place out;
   double reach = 0;
   for (std::size_t e = 0; e < 3; ++e) {
-    const double step = (m[axis][e] - seen[axis] * m[2][e]) * spacing[e] * cone_density;
+    const double step = (m[axis][e] - seen[axis] * m[2][e]) * spacing[e] * density;
     out.numbers.s[e] = static_cast<float>(step);
     reach += std::abs(step) * half_block[e] / lambda_min;
   }
-  const double middle = (seen[axis] + 0.5) * cone_density, whole = std::floor(middle - reach) - 1;
+  const double middle = table_place(axis, seen[axis], density), whole = std::floor(middle - reach) - 1;
   out.numbers.s[3] = static_cast<float>(middle - whole);
   out.whole = to_int(static_cast<std::int64_t>(whole) - first);
   out.error = 1.01 * half_ulp * (reach * (14 + 5 * cancellation) + 4);
@@ -287,8 +296,8 @@ Place place_of(const ViewMatrix& m, std::size_t axis, const Vec3& seen, const Ve
 /// One view's numbers about a block's middle; what they err, and how many rows of the table a step along z
 /// takes at most, are taken into account.
 ViewNumbers numbers_about(const ViewMatrix& m, const Vec3& middle, const Vec3& spacing,
-                          std::int64_t first_column, std::int64_t first_row, ConeNodeFacts& facts,
-                          double& row_step) {
+                          std::int64_t first_column, std::int64_t first_row,
+                          const std::array<double, 2>& density, ConeNodeFacts& facts, double& row_step) {
   const Vec3 seen = projected(m, middle);
   double growth = 0;
   ViewNumbers out{};
@@ -298,8 +307,8 @@ ViewNumbers numbers_about(const ViewMatrix& m, const Vec3& middle, const Vec3& s
   }
   out.lambda.s[3] = static_cast<float>(seen[2]);
   const double least = seen[2] - growth, cancellation = (seen[2] + growth) / least;
-  const Place at_u = place_of(m, 0, seen, spacing, least, cancellation, first_column),
-              at_v = place_of(m, 1, seen, spacing, least, cancellation, first_row);
+  const Place at_u = place_of(m, 0, seen, spacing, least, cancellation, first_column, density[0]),
+              at_v = place_of(m, 1, seen, spacing, least, cancellation, first_row, density[1]);
   out.u = at_u.numbers;
   out.v = at_v.numbers;
   out.whole = {{at_u.whole, at_v.whole, 0, 0}};
@@ -337,7 +346,7 @@ void VerifyConeNodes::back_project(const Nodes& wanted, const Tiles& tiles, cons
         for (std::int64_t k = 0; k < table.filled; ++k)
           numbers[at((t * blocks + b) * table.filled + k)] =
               numbers_about(field_.views()[at(table.first_view + k)], middle, wanted.spacing,
-                            table.window.first_column, table.window.first_row, own, own_step);
+                            table.window.first_column, table.window.first_row, density_, own, own_step);
       }
       const std::lock_guard guard(lock);
       facts.place_u = std::max(facts.place_u, own.place_u);

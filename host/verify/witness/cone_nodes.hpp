@@ -9,12 +9,13 @@
 
 #include "host/base/opencl/array.hpp"
 #include "host/field/fbp/coverage.hpp"
+#include "host/verify/witness/cosine_transform.hpp"
 #include "vdvr/expert/exact_field.hpp"
 #include "vdvr/expert/grid.hpp"
 
 namespace vdvr {
 
-/// Values of the table to a pixel, along u and along v, and points of Lagrange between them.
+/// Values of the table to a pixel, along u at least so many and along v, and points of Lagrange between them.
 constexpr std::int64_t cone_density = 6;
 constexpr int cone_points = 8;
 
@@ -27,6 +28,7 @@ ConeNodeRates cone_node_rates(const ExactField& field, const Coverage& coverage,
 
 /// What the errors of nodes depend on (cone_bounds.hpp).
 struct ConeNodeFacts {
+  double density_u = cone_density;  ///< values of the table to a pixel along u
   double place_u = 0, place_v = 0;  ///< by how much places err, in pixels
   double cancellation = 1;          ///< largest sum of magnitudes of what lambda is made of, over lambda
   std::int64_t together = 1;        ///< views that are summed before they are added to the others
@@ -67,6 +69,8 @@ class VerifyConeNodes {
   opencl::State& state_;
   const ExactField& field_;
   const Coverage& coverage_;
+  CosineTransform along_u_;
+  std::array<double, 2> density_;  // of the table along u and v, places to a pixel
   double unit_, furthest_;
   bool upright_;
 };

@@ -8,15 +8,14 @@
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
 #include "host/verify/witness/cosine_sums.hpp"
+#include "host/verify/witness/cosine_transform.hpp"
 #include "host/verify/witness/lagrange.hpp"
 
 namespace vdvr {
 namespace {
 
-using namespace cosine_sums;
-
 using std::numbers::pi;
-constexpr std::int64_t sup_density = 3;  // points per pixel where sups are sampled
+constexpr std::int64_t sup_density = 3;  // places to a pixel at least where sups are sampled
 
 }  // namespace
 
@@ -24,22 +23,22 @@ SupsByView view_sups(std::span<const double> coefficients, const ParallelGeometr
                      const Progress& progress) {
   const std::int64_t U = g.columns, V = g.rows, K = g.views();
   // One row does not vary along v. Else rows at every third of a pixel, from edge to edge of the half period.
+  constexpr std::int64_t together = CosineTransform::together;
   const std::int64_t heights = V == 1 ? 1 : sup_density * V + 1,
-                     rows = std::min<std::int64_t>((heights + lanes - 1) / lanes * lanes, 64);
-  const auto cosine_u = cosine_period(sup_density * U), cosine_v = cosine_period(sup_density * V);
-  const double factor_u = 1 / std::cos(pi / static_cast<double>(2 * sup_density)),
-               factor = (1 + 1e-9) * factor_u * (V == 1 ? 1 : factor_u);
+                     rows = std::min<std::int64_t>((heights + together - 1) / together * together, 64);
+  const CosineTransform along_u(U, sup_density);
+  const auto cosine_v = cosine_sums::cosine_period(sup_density * V);
+  const double rise_v = V == 1 ? 1 : 1 / std::cos(pi / static_cast<double>(2 * sup_density)),
+               factor = (1 + 1e-9) * along_u.rise() * rise_v;
   const double wave_u = pi / (static_cast<double>(U) * g.pitch_u),
                wave_v = pi / (static_cast<double>(V) * g.pitch_v);
   SupsByView sups{std::vector<double>(at(K)), std::vector<double>(at(K)), std::vector<double>(at(K))};
   parallel_for(K, progress, "sups", [&](std::int64_t k) {
     const double* a = coefficients.data() + k * U * V;
-    std::vector<double> basis(at(V * rows)), basis_vv(at(V * rows)), line(at(U * rows));
+    std::vector<double> basis(at(V * rows)), basis_vv(at(V * rows)), line(at(U * rows)), work;
     const auto largest = [&](double sup) {
-      sum_columns(line, U, rows, sup_density, cosine_u,
-                  [&](std::int64_t, std::int64_t, const std::array<double, lanes>& values) {
-                    for (const double v : values) sup = std::max(sup, std::abs(v));
-                  });
+      for (std::int64_t r = 0; r < rows; r += together)
+        sup = std::max(sup, along_u.largest(line.data() + r, rows, work));
       return sup;
     };
     for (std::int64_t first = 0; first < heights; first += rows) {
@@ -50,9 +49,9 @@ SupsByView view_sups(std::span<const double> coefficients, const ParallelGeometr
           basis[at(l * rows + r)] = c;
           basis_vv[at(l * rows + r)] = c * w * w;
         }
-      sum_rows(a, U, V, basis_vv, rows, line);
+      cosine_sums::sum_rows(a, U, V, basis_vv, rows, line);
       sups.second_v[at(k)] = largest(sups.second_v[at(k)]);
-      sum_rows(a, U, V, basis, rows, line);
+      cosine_sums::sum_rows(a, U, V, basis, rows, line);
       sups.value[at(k)] = largest(sups.value[at(k)]);
       for (std::int64_t m = 0; m < U; ++m) {
         const double w = static_cast<double>(m) * wave_u;
@@ -77,9 +76,9 @@ struct Sums {
 // docs/error-bounds.md, "What verify does", step 1: each row of its table is one kind.
 std::vector<KindOfError> error_kinds(const Sums& S, double host_rounding, const ParallelGeometry& g,
                                      const Vec3& h, const NodePath& path) {
-  const double d = g.pitch_u / static_cast<double>(fine_columns),
+  const double d = g.pitch_u / path.density,
                slope = std::min(pi / g.pitch_u * S.value, std::sqrt(2 * S.value * S.second_u));
-  const double columns = static_cast<double>(fine_columns * (g.columns + 2)),
+  const double columns = path.density * static_cast<double>(g.columns + 2),
                runs = static_cast<double>((g.views() + views_per_run - 1) / views_per_run),
                row_runs = static_cast<double>((path.terms + rows_per_run - 1) / rows_per_run);
   const double column = (half_ulp * (4 * path.reach + 6) + 0x1p-48 * columns) * d * slope +

@@ -14,7 +14,7 @@
 
 namespace vdvr {
 
-/// Fine columns per detector column, on which F is interpolated.
+/// Fine columns to a detector column at least, on which F is interpolated.
 constexpr std::int64_t fine_columns = 12;
 
 /// Views, and rows of the product along z, that are summed by themselves before they are added to the others.
@@ -25,19 +25,20 @@ struct SupsByView {
   std::vector<double> value, second_u, second_v;  ///< |q|, |q_uu|, |q_vv|
 };
 
-/// Cost: views * 18 rows * columns * (rows + columns) multiply-adds on the host. `coefficients` double
-/// [view][m][l].
+/// Cost on the host: views * rows * columns * (6 rows + 30 log2(columns)) multiply-adds. `coefficients`
+/// double [view][m][l].
 SupsByView view_sups(std::span<const double> coefficients, const ParallelGeometry& geometry,
                      const Progress& progress);
 
 /// How F is computed at nodes of gold (nodes.hpp).
 struct NodePath {
-  int across = 1;          ///< places of gold to a back-projected node, across z
-  bool rows = true;        ///< nodes lie at the detector's rows; else at heights, `along` places to each
-  int along = 1;           ///< of heights
-  Vec3 band{0, 0, 0};      ///< of F at back-projected nodes, radians a node; z: at heights
-  std::int64_t terms = 1;  ///< of the product along z
-  double gain = 1;         ///< largest sum of magnitudes of its rows, 1 for heights
+  int across = 1;    ///< places of gold to a back-projected node, across z
+  bool rows = true;  ///< nodes lie at the detector's rows; else at heights, `along` places to each
+  int along = 1;     ///< of heights
+  double density = fine_columns;  ///< fine columns to a detector column
+  Vec3 band{0, 0, 0};             ///< of F at back-projected nodes, radians a node; z: at heights
+  std::int64_t terms = 1;         ///< of the product along z
+  double gain = 1;                ///< largest sum of magnitudes of its rows, 1 for heights
   double reach = 0;        ///< largest distance, in fine columns, of a node of a tile from the tile's first
   std::int64_t calls = 1;  ///< parts in which the views are summed
 };

@@ -49,15 +49,20 @@ int nodes_across(const Grid& grid, const ParallelGeometry& g) {
 
 VerifyNodes::VerifyNodes(opencl::State& state, const ExactField& field, const Grid& grid, double unit,
                          double furthest)
-    : state_(state), field_(field), grid_(grid), unit_(unit), gain_(row_gain(field.geometry().rows)) {
-  const ParallelGeometry& g = field.geometry();
-  pad_ = static_cast<std::int64_t>(std::ceil(furthest / g.pitch_u * static_cast<double>(fine_columns))) + 6;
-  columns_ = fine_columns * g.columns + 1 + 2 * pad_;
+    : state_(state),
+      field_(field),
+      grid_(grid),
+      unit_(unit),
+      along_u_(field.geometry().columns, fine_columns),
+      density_(static_cast<double>(along_u_.places()) / static_cast<double>(field.geometry().columns)),
+      gain_(row_gain(field.geometry().rows)) {
+  pad_ = static_cast<std::int64_t>(std::ceil(furthest / field.geometry().pitch_u * density_)) + 6;
+  columns_ = along_u_.places() + 2 * pad_;
 }
 
 VerifyNodes::VerifyNodes(opencl::State& state, const ExactField& field, const Coverage& coverage,
                          const Grid& grid, double unit, double furthest)
-    : state_(state), field_(field), grid_(grid), unit_(unit) {
+    : state_(state), field_(field), grid_(grid), unit_(unit), along_u_(1, 1), density_(fine_columns) {
   cone_.emplace(state, field, coverage, unit, furthest);
 }
 
@@ -98,7 +103,7 @@ struct VerifyNodes::Table {
 
 void VerifyNodes::fill(Table& table, std::int64_t first_row, std::int64_t first_view) {
   const ParallelGeometry& g = field_.geometry();
-  const std::int64_t U = g.columns, V = g.rows, last = fine_columns * U;
+  const std::int64_t U = g.columns, V = g.rows, all = along_u_.places();
   table.first_view = first_view;
   table.filled = std::min(table.views, g.views() - first_view);
   std::vector<double> basis(at(V * row_lanes));
@@ -111,23 +116,23 @@ void VerifyNodes::fill(Table& table, std::int64_t first_row, std::int64_t first_
     for (std::int64_t l = 0; l < V; ++l)
       basis[at(l * row_lanes + r)] = std::cos(pi * static_cast<double>(l) * half / static_cast<double>(V));
   }
-  const auto cosine = cosine_sums::cosine_period(last);
   parallel_for(table.filled, {}, "", [&](std::int64_t k) {
-    std::vector<double> line(at(U * row_lanes));
+    std::vector<double> line(at(U * row_lanes)), work;
     cosine_sums::sum_rows(field_.coefficients().data() + (first_view + k) * U * V, U, V, basis, row_lanes,
                           line);
     float* out = table.host.data() + k * table.per_view;
-    cosine_sums::sum_columns(
-        line, U, row_lanes, fine_columns, cosine,
-        [&](std::int64_t n, std::int64_t r, const std::array<double, cosine_sums::lanes>& values) {
-          for (std::int64_t i = 0; i < cosine_sums::lanes; ++i)
-            out[(n + pad_) * row_lanes + r + i] = static_cast<float>(values[at(i)] / unit_);
-        });
-    // Beyond the detector's edges the series is its own mirror image.
-    for (std::int64_t n = 0; n < columns_; ++n) {
-      std::int64_t m = std::abs(n - pad_) % (2 * last);
-      if (m > last) m = 2 * last - m;
-      if (m != n - pad_) std::copy_n(out + (m + pad_) * row_lanes, row_lanes, out + n * row_lanes);
+    along_u_.values(line.data(), row_lanes, unit_, out + pad_ * row_lanes, row_lanes, work);
+    // Beyond the detector's edges, half a place before the first and after the last, the series is its own
+    // mirror image.
+    const auto mirror = [&](std::int64_t n) {
+      std::int64_t m = (n - pad_) % (2 * all);
+      if (m < 0) m += 2 * all;
+      if (m >= all) m = 2 * all - 1 - m;
+      std::copy_n(out + (m + pad_) * row_lanes, row_lanes, out + n * row_lanes);
+    };
+    for (std::int64_t n = 0; n < pad_; ++n) {
+      mirror(n);
+      mirror(columns_ - 1 - n);
     }
   });
   table.device.write(std::span<const float>(table.host).first(at(table.filled * table.per_view)));
@@ -154,7 +159,7 @@ void VerifyNodes::make(const Part& part) {
       tiles.push_back({{to_int(t % tile_columns_ * tile), to_int(t / tile_columns_ * tile)}});
   if (tiles.empty()) return;
   const std::size_t K = g.theta_rad.size();
-  const double scale = static_cast<double>(fine_columns) / g.pitch_u;
+  const double scale = density_ / g.pitch_u;
   std::vector<cl_float4> steps(tiles.size() * K);
   for (std::size_t b = 0; b < tiles.size(); ++b)
     for (std::size_t k = 0; k < K; ++k) {
@@ -162,10 +167,10 @@ void VerifyNodes::make(const Part& part) {
       const double t =
           (grid_.origin[0] + static_cast<double>(part.first_x + tiles[b].s[0]) / n * grid_.spacing[0]) * c +
           (grid_.origin[1] + static_cast<double>(part.first_y + tiles[b].s[1]) / n * grid_.spacing[1]) * s;
-      // Fine column 0 of the table lies at the detector's edge, half a pixel before column 0, less the
-      // padding.
-      const double column = (t / g.pitch_u + g.center_of_view(k) + 0.5) * static_cast<double>(fine_columns) +
-                            static_cast<double>(pad_);
+      // The detector's edge lies half a pixel before column 0, and half a fine column before the first that
+      // the padding leaves.
+      const double column =
+          (t / g.pitch_u + g.center_of_view(k) + 0.5) * density_ - 0.5 + static_cast<double>(pad_);
       const double along_x = c * grid_.spacing[0] / n * scale, along_y = s * grid_.spacing[1] / n * scale;
       const double whole =
           std::floor(column + std::min(0.0, along_x * tile) + std::min(0.0, along_y * tile)) - 1;
@@ -341,8 +346,9 @@ NodePath VerifyNodes::path(const Part& part, int rate) const {
   if (cone_) return p;
   p.calls = (g.views() + views_at_once() - 1) / views_at_once();
   const auto n = static_cast<double>(part.across);
-  p.reach = static_cast<double>(fine_columns) / g.pitch_u *
-            std::hypot(grid_.spacing[0] / n, grid_.spacing[1] / n) * static_cast<double>(tile);
+  p.density = density_;
+  p.reach = density_ / g.pitch_u * std::hypot(grid_.spacing[0] / n, grid_.spacing[1] / n) *
+            static_cast<double>(tile);
   for (std::size_t a = 0; a < 3; ++a)
     p.band[a] = pi * grid_.spacing[a] / (a < 2 ? n * g.pitch_u : static_cast<double>(part.along) * g.pitch_v);
   return p;
