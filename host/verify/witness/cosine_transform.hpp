@@ -7,8 +7,9 @@
 
 namespace vdvr {
 
-/// The sums f(x) over m < terms of a[m] cos(m x) at x = (n + 1/2) pi / places(), 0 <= n < places(). Errors:
-/// fewer than 6 (log2(terms) + 2) roundings in double precision of twice the magnitudes' sum.
+/// The sums f(x) over m < terms of a[m] cos(m x) at x = (n + 1/2) pi / places(), 0 <= n < places(). They
+/// err by fewer than 6 (log2(terms) + 2) roundings in double precision of the sum of magnitudes of the a[m],
+/// the largest of all series (docs/error-bounds.md, "What verify does", step 1).
 class CosineTransform {
  public:
   /// Series that are summed side by side.
@@ -23,7 +24,7 @@ class CosineTransform {
   /// Of `together` series a[m * stride + series], the largest magnitude at the places. `work` is what the
   /// transform needs and may be used again. Cost: 2.5 places() log2(terms) operations a series.
   [[nodiscard]] double largest(const double* a, std::int64_t stride, std::vector<double>& work) const;
-  /// out[n * out_stride + series] = f / unit.
+  /// out[n * out_stride + series] = f / unit, which is a power of two.
   void values(const double* a, std::int64_t stride, double unit, float* out, std::int64_t out_stride,
               std::vector<double>& work) const;
 
