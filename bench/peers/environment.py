@@ -4,6 +4,7 @@ Nothing here is installed into the system: packages come from PyPI into one fold
 import json
 import os
 import pathlib
+import resource
 import subprocess
 import sys
 
@@ -85,6 +86,11 @@ def read_mha(path, mapped=False):
         data = numpy.memmap(path, "<f4", "r", file.tell(), count) if mapped else numpy.fromfile(file, "<f4", count)
     vector = lambda *keys: [float(v) for v in next(header[k] for k in keys if k in header).split()]
     return data.reshape(size[::-1]), vector("ElementSpacing"), vector("Offset", "Origin", "Position")
+
+
+def processor_seconds_of_children():
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def load_average():

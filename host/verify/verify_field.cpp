@@ -208,6 +208,7 @@ void VerifyField::run(const std::vector<std::uint8_t>& selected, std::span<const
       ++done;
     }
   }
+  nodes_.release();
 }
 
 void VerifyField::run_slab(const Shape& s, const std::vector<std::array<std::int64_t, 2>>& blocks,

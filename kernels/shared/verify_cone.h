@@ -11,13 +11,13 @@
 #define VDVR_VERIFY_CONE_VIEWS 4
 
 typedef struct {
-  int accumulate;       // whether the views are added to what the nodes hold, or written
-  int views;            // in the table
-  int columns, rows;    // of a view of the table
-  int first_tile;       // of the tiles whose blocks have their numbers here
-  int tiles;            // so many
-  int blocks;           // of heights
-  int nx, all_heights;  // of the array of nodes
+  int accumulate;     // whether the views are added to what the nodes hold, or written
+  int views;          // in the table
+  int columns, rows;  // of a view of the table
+  int first_tile;     // of the tiles whose blocks have their numbers here
+  int tiles;          // so many
+  int blocks;         // of heights
+  int all_heights;    // of a node
 } VdvrVerifyCone;
 
 #endif

@@ -16,17 +16,16 @@ typedef struct {
   int all_views;    // of the scan
   int columns;      // of the table
   int tiles;        // to be back-projected
-  int nx;           // of the array of nodes: a multiple of VDVR_VERIFY_TILE
   int rows_padded;  // heights of a node, to a multiple of 16
   int first_row;    // of the 16 that the table holds
 } VdvrVerifyRows;
 
 typedef struct {
   int blocks;
-  int nx, ny;        // nodes of a block across
-  int groups;        // of 16 heights
-  int all_x, all_y;  // of the array of nodes
-  int rows_padded;   // of it
+  int nx, ny;            // nodes of a block across
+  int groups;            // of 16 heights
+  int tiles_x, tiles_y;  // of the part that nodes are of
+  int rows_padded;       // of a node
 } VdvrVerifyHeights;
 
 typedef struct {

@@ -21,7 +21,7 @@
 
 namespace vdvr {
 
-static_assert(sizeof(VdvrVerifyCone) == 36);
+static_assert(sizeof(VdvrVerifyCone) == 32);
 
 namespace {
 
@@ -153,11 +153,10 @@ VerifyConeNodes::Window VerifyConeNodes::window_of(const Nodes& wanted,
           magnitude};
 }
 
-/// Some views at the places of a window, on the host and on the device: [view][column][row].
+/// Some views at the places of a window: [view][column][row].
 struct VerifyConeNodes::Table {
   Table(opencl::State& of, const Window& of_places, std::int64_t at_once)
       : state(of), window(of_places), views(at_once), counted(of, bytes(), "dense filtered projections") {
-    host.resize(at(views * per_view()));
     // Strips are read in whole vectors, beyond the last row too.
     device = opencl::DeviceArray<float>(state, count(views * per_view() + VDVR_VERIFY_CONE_STRIP),
                                         "dense filtered projections");
@@ -173,7 +172,6 @@ struct VerifyConeNodes::Table {
   std::int64_t views;  // at a time
   HostMemory counted;
   std::int64_t first_view = 0, filled = 0;
-  std::vector<float> host;
   opencl::DeviceArray<float> device;
 };
 
@@ -190,9 +188,8 @@ void VerifyConeNodes::fill(Table& table, std::int64_t first_view) const {
     if (m < 0) m += 2 * all;
     return m >= all ? 2 * all - 1 - m : m;
   };
-  parallel_for(table.filled, {}, "", [&](std::int64_t k) {
+  const auto fill_view = [&](std::int64_t k, float* out) {
     const double* a = field_.coefficients().data() + (first_view + k) * U * V;
-    float* out = table.host.data() + k * table.per_view();
     std::vector<double> work;
     for (std::int64_t first = 0; first < window.rows; first += most_rows) {
       const std::int64_t rows = std::min(most_rows, window.rows - first);
@@ -209,8 +206,11 @@ void VerifyConeNodes::fill(Table& table, std::int64_t first_view) const {
         std::copy_n(dense.data() + mirrored(window.first_column + n) * rows, rows,
                     out + n * window.rows + first);
     }
+  };
+  table.device.write_mapped([&](std::span<float> to) {
+    parallel_for(table.filled, {}, "",
+                 [&](std::int64_t k) { fill_view(k, to.data() + k * table.per_view()); });
   });
-  table.device.write(std::span<const float>(table.host).first(at(table.filled * table.per_view())));
 }
 
 /// Wanted tiles that are not too far out, and of each which blocks of heights: [tile][block].
@@ -218,7 +218,8 @@ struct VerifyConeNodes::Tiles {
   std::vector<cl_int2> first;
   std::vector<std::uint8_t> blocks;
   std::vector<cl_uchar4> ranges;  // first and last x, then y
-  opencl::DeviceArray<cl_int2> device_first;
+  std::vector<cl_int> slots;      // among all that are wanted
+  opencl::DeviceArray<cl_int> device_slots;
   opencl::DeviceArray<cl_uchar4> device_ranges;
   opencl::DeviceArray<std::uint8_t> device_blocks;
 };
@@ -235,6 +236,7 @@ ConeNodeFacts VerifyConeNodes::make(const Nodes& wanted, const opencl::DeviceArr
                  y = wanted.first[1] + static_cast<double>(t[1]) * wanted.spacing[1] + 0.5 * side_y;
     if (coverage_.margin(x, y) < -furthest_ - 0.5 * std::hypot(side_x, side_y)) continue;
     tiles.first.push_back({{to_int(t[0]), to_int(t[1])}});
+    tiles.slots.push_back(to_int(static_cast<std::int64_t>(i)));
     constexpr std::array<std::uint8_t, 4> whole{0, tile_nodes - 1, 0, tile_nodes - 1};
     const auto& range = wanted.ranges.empty() ? whole : wanted.ranges[i];
     tiles.ranges.push_back({{range[0], range[1], range[2], range[3]}});
@@ -250,7 +252,7 @@ ConeNodeFacts VerifyConeNodes::make(const Nodes& wanted, const opencl::DeviceArr
   facts.together = std::clamp<std::int64_t>(static_cast<std::int64_t>(share / each), 1, std::min(even, K));
   facts.calls = (K + facts.together - 1) / facts.together;
   Table table(state_, window, facts.together);
-  tiles.device_first = {state_, std::span<const cl_int2>(tiles.first), "tiles of nodes"};
+  tiles.device_slots = {state_, std::span<const cl_int>(tiles.slots), "tiles of nodes"};
   tiles.device_blocks = {state_, std::span<const std::uint8_t>(tiles.blocks), "heights of tiles of nodes"};
   tiles.device_ranges = {state_, std::span<const cl_uchar4>(tiles.ranges), "wanted nodes of tiles"};
   for (std::int64_t first = 0; first < K; first += facts.together) {
@@ -363,7 +365,6 @@ void VerifyConeNodes::back_project(const Nodes& wanted, const Tiles& tiles, cons
                                .first_tile = to_int(first),
                                .tiles = to_int(n),
                                .blocks = to_int(blocks),
-                               .nx = to_int(wanted.nx),
                                .all_heights = to_int(wanted.heights)};
     // Eight rows from each of a block's places on; places may round to the row beside. A device whose
     // work-items have no caches of their own gains nothing.
@@ -378,7 +379,7 @@ void VerifyConeNodes::back_project(const Nodes& wanted, const Tiles& tiles, cons
     kernel(opencl::in_groups(state_.info, {count(groups), count(tile_nodes), count(n)},
                              {count(strips ? 1 : std::min<std::int64_t>(groups, 8)), count(tile_nodes), 1},
                              strips ? 1 : 0),
-           nodes.buffer(), table.device.buffer(), on_device.buffer(), tiles.device_first.buffer(),
+           nodes.buffer(), table.device.buffer(), on_device.buffer(), tiles.device_slots.buffer(),
            tiles.device_blocks.buffer(), tiles.device_ranges.buffer(), shape);
     opencl::finish(state_, "nodes of the field to verify against");  // before the numbers go
   }

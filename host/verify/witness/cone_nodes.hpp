@@ -42,17 +42,17 @@ class VerifyConeNodes {
   VerifyConeNodes(opencl::State& state, const ExactField& field, const Coverage& coverage, double unit,
                   double furthest);
 
-  /// An array of nodes [y][x][heights] in tiles of VDVR_VERIFY_TILE columns a side.
+  /// Nodes [tile][y][x][heights] in tiles of VDVR_VERIFY_TILE columns a side.
   struct Nodes {
     Vec3 first{}, spacing{};                         ///< where the first lies, and how far apart they are
-    std::int64_t nx = 0, heights = 0;                ///< of the array; heights to a multiple of 16
+    std::int64_t heights = 0;                        ///< of a node, to a multiple of 16
     std::int64_t used = 0;                           ///< of the heights
     std::vector<std::array<std::int64_t, 2>> tiles;  ///< wanted, by their first nodes x, y
     std::vector<std::uint8_t> blocks;                ///< [tile][heights / 16]: 0: not wanted; all where empty
     /// [tile]: in it the first and last x, then y, that are wanted; all where empty.
     std::vector<std::array<std::uint8_t, 4>> ranges;
   };
-  /// Writes those of the wanted tiles that are not too far out. Throws InputError where such a tile reaches a
+  /// Writes those tiles that are not too far out. Throws InputError where such a tile reaches a
   /// source's plane. Cost: columns * rows * (columns + 6 rows) * 6 multiply-adds a view on the host, or fewer
   /// where the nodes see but some of the rows; 64 a view and node on the device.
   ConeNodeFacts make(const Nodes& wanted, const opencl::DeviceArray<float>& nodes);

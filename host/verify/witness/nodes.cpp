@@ -15,7 +15,7 @@
 
 namespace vdvr {
 
-static_assert(sizeof(VdvrVerifyRows) == 36 && sizeof(VdvrVerifyHeights) == 28 &&
+static_assert(sizeof(VdvrVerifyRows) == 32 && sizeof(VdvrVerifyHeights) == 28 &&
               sizeof(VdvrVerifyBetween) == 28);
 static_assert(VDVR_VERIFY_VIEWS == views_per_run && VDVR_VERIFY_ROWS == rows_per_run);
 
@@ -67,8 +67,10 @@ VerifyNodes::VerifyNodes(opencl::State& state, const ExactField& field, const Co
 }
 
 std::uint64_t VerifyNodes::bytes_of(const Part& part) const {
-  return 4 * count(tiles_across(part.nx) * tile * tiles_across(part.ny) * tile) *
-         count(up(rows_of(part, field_.geometry().rows), row_lanes));
+  const auto wanted = std::max<std::int64_t>(1, std::count(part.tiles.begin(), part.tiles.end(), 1));
+  const std::int64_t nodes = tile * tile * up(rows_of(part, field_.geometry().rows), row_lanes);
+  return count(wanted) * (4 * count(nodes) +
+                          (cone_ ? std::uint64_t{0} : sizeof(cl_float4) * count(field_.geometry().views())));
 }
 
 std::int64_t VerifyNodes::views_at_once() const {
@@ -77,14 +79,13 @@ std::int64_t VerifyNodes::views_at_once() const {
   return std::clamp<std::int64_t>(budget / (4 * columns_ * row_lanes), 1, field_.geometry().views());
 }
 
-/// 16 rows of the fine columns of some views, on the host and on the device.
+/// 16 rows of the fine columns of some views.
 struct VerifyNodes::Table {
   Table(opencl::State& of, std::int64_t columns, std::int64_t at_once)
       : state(of),
         per_view(columns * row_lanes),
         views(at_once),
         counted(of, bytes(), "fine columns of the filtered projections") {
-    host.resize(at(views * per_view));
     device = opencl::DeviceArray<float>(state, count(views * per_view + room),
                                         "fine columns of the filtered projections");
   }
@@ -97,11 +98,20 @@ struct VerifyNodes::Table {
   std::int64_t per_view, views;  // floats; views at a time
   HostMemory counted;
   std::int64_t first_view = 0, filled = 0;
-  std::vector<float> host;
   opencl::DeviceArray<float> device;
 };
 
-void VerifyNodes::fill(Table& table, std::int64_t first_row, std::int64_t first_view) {
+VerifyNodes::~VerifyNodes() = default;
+
+void VerifyNodes::release() {
+  nodes_.reset();
+  slots_.reset();
+  steps_.reset();
+  table_.reset();
+}
+
+void VerifyNodes::fill(std::int64_t first_row, std::int64_t first_view) {
+  Table& table = *table_;
   const ParallelGeometry& g = field_.geometry();
   const std::int64_t U = g.columns, V = g.rows, all = along_u_.places();
   table.first_view = first_view;
@@ -116,11 +126,10 @@ void VerifyNodes::fill(Table& table, std::int64_t first_row, std::int64_t first_
     for (std::int64_t l = 0; l < V; ++l)
       basis[at(l * row_lanes + r)] = std::cos(pi * static_cast<double>(l) * half / static_cast<double>(V));
   }
-  parallel_for(table.filled, {}, "", [&](std::int64_t k) {
+  const auto fill_view = [&](std::int64_t k, float* out) {
     std::vector<double> line(at(U * row_lanes)), work;
     cosine_sums::sum_rows(field_.coefficients().data() + (first_view + k) * U * V, U, V, basis, row_lanes,
                           line);
-    float* out = table.host.data() + k * table.per_view;
     along_u_.values(line.data(), row_lanes, unit_, out + pad_ * row_lanes, row_lanes, work);
     // Beyond the detector's edges, half a place before the first and after the last, the series is its own
     // mirror image.
@@ -134,96 +143,115 @@ void VerifyNodes::fill(Table& table, std::int64_t first_row, std::int64_t first_
       mirror(n);
       mirror(columns_ - 1 - n);
     }
+  };
+  table.device.write_mapped([&](std::span<float> to) {
+    parallel_for(table.filled, {}, "", [&](std::int64_t k) { fill_view(k, to.data() + k * table.per_view); });
   });
-  table.device.write(std::span<const float>(table.host).first(at(table.filled * table.per_view)));
+}
+
+// Where each view sees the first node of a tile, and its steps across it.
+void VerifyNodes::make_steps(const std::vector<std::array<std::int64_t, 2>>& tiles) {
+  const ParallelGeometry& g = field_.geometry();
+  const std::size_t K = g.theta_rad.size();
+  const double scale = density_ / g.pitch_u, n = part_.across;
+  std::vector<std::array<double, 2>> directions;
+  for (const double theta : g.theta_rad) directions.push_back({std::cos(theta), std::sin(theta)});
+  const auto step = [&](const std::array<std::int64_t, 2>& node, std::size_t k) {
+    const auto& [c, s] = directions[k];
+    const double t =
+        (grid_.origin[0] + static_cast<double>(part_.first_x + node[0]) / n * grid_.spacing[0]) * c +
+        (grid_.origin[1] + static_cast<double>(part_.first_y + node[1]) / n * grid_.spacing[1]) * s;
+    // The detector's edge lies half a pixel before column 0, and half a fine column before the first that
+    // the padding leaves.
+    const double column =
+        (t / g.pitch_u + g.center_of_view(k) + 0.5) * density_ - 0.5 + static_cast<double>(pad_);
+    const double along_x = c * grid_.spacing[0] / n * scale, along_y = s * grid_.spacing[1] / n * scale;
+    const double whole =
+        std::floor(column + std::min(0.0, along_x * tile) + std::min(0.0, along_y * tile)) - 1;
+    return cl_float4{{static_cast<float>(along_x), static_cast<float>(along_y),
+                      static_cast<float>(column - whole), static_cast<float>(whole)}};
+  };
+  steps_.emplace(state_, tiles.size() * K, "view positions");
+  steps_->write_mapped([&](std::span<cl_float4> steps) {
+    parallel_for(static_cast<std::int64_t>(tiles.size()), {}, "", [&](std::int64_t t) {
+      for (std::size_t k = 0; k < K; ++k) steps[at(t) * K + k] = step(tiles[at(t)], k);
+    });
+  });
 }
 
 void VerifyNodes::make(const Part& part) {
   const ParallelGeometry& g = field_.geometry();
   part_ = part;
   nodes_.reset();
-  tiles_.reset();
+  slots_.reset();
   steps_.reset();
-  tile_columns_ = tiles_across(part.nx);
-  const std::int64_t rows = rows_of(part, g.rows);
+  const std::int64_t rows = rows_of(part, g.rows), across = tiles_across(part.nx);
   rows_padded_ = up(rows, row_lanes);
-  nodes_.emplace(state_, bytes_of(part) / 4 + count(room), "nodes of the field to verify against");
-  nodes_->fill(0.0f);
-  if (cone_) {
-    make_cone_nodes(part);
-    return;
-  }
-  std::vector<cl_int2> tiles;
-  for (std::int64_t t = 0; t < static_cast<std::int64_t>(part.tiles.size()); ++t)
-    if (part.tiles[at(t)])
-      tiles.push_back({{to_int(t % tile_columns_ * tile), to_int(t / tile_columns_ * tile)}});
-  if (tiles.empty()) return;
-  const std::size_t K = g.theta_rad.size();
-  const double scale = density_ / g.pitch_u;
-  std::vector<cl_float4> steps(tiles.size() * K);
-  for (std::size_t b = 0; b < tiles.size(); ++b)
-    for (std::size_t k = 0; k < K; ++k) {
-      const double c = std::cos(g.theta_rad[k]), s = std::sin(g.theta_rad[k]), n = part.across;
-      const double t =
-          (grid_.origin[0] + static_cast<double>(part.first_x + tiles[b].s[0]) / n * grid_.spacing[0]) * c +
-          (grid_.origin[1] + static_cast<double>(part.first_y + tiles[b].s[1]) / n * grid_.spacing[1]) * s;
-      // The detector's edge lies half a pixel before column 0, and half a fine column before the first that
-      // the padding leaves.
-      const double column =
-          (t / g.pitch_u + g.center_of_view(k) + 0.5) * density_ - 0.5 + static_cast<double>(pad_);
-      const double along_x = c * grid_.spacing[0] / n * scale, along_y = s * grid_.spacing[1] / n * scale;
-      const double whole =
-          std::floor(column + std::min(0.0, along_x * tile) + std::min(0.0, along_y * tile)) - 1;
-      steps[b * K + k] = {{static_cast<float>(along_x), static_cast<float>(along_y),
-                           static_cast<float>(column - whole), static_cast<float>(whole)}};
-    }
-  tiles_.emplace(state_, std::span<const cl_int2>(tiles), "tiles of nodes");
-  steps_.emplace(state_, std::span<const cl_float4>(steps), "view positions");
-  Table table(state_, columns_, views_at_once());
-  for (std::int64_t row = 0; row < rows; row += row_lanes) back_project(table, row);
-}
-
-void VerifyNodes::make_cone_nodes(const Part& part) {
-  VerifyConeNodes::Nodes wanted;
-  const std::array<std::int64_t, 3> first{part.first_x, part.first_y, part.first_z};
-  for (std::size_t a = 0; a < 3; ++a) {
-    wanted.spacing[a] = grid_.spacing[a] / static_cast<double>(a < 2 ? part.across : part.along);
-    wanted.first[a] = grid_.origin[a] + static_cast<double>(first[a]) * wanted.spacing[a];
-  }
-  wanted.nx = tile_columns_ * tile;
-  wanted.heights = rows_padded_;
-  wanted.used = part.nz;
-  const std::int64_t blocks = part.blocks_along();
+  std::vector<std::array<std::int64_t, 2>> tiles;  // by their first nodes
+  std::vector<cl_int> slots(part.tiles.size(), 0);
   for (std::int64_t t = 0; t < static_cast<std::int64_t>(part.tiles.size()); ++t) {
     if (!part.tiles[at(t)]) continue;
-    wanted.tiles.push_back({t % tile_columns_ * tile, t / tile_columns_ * tile});
-    if (!part.ranges.empty()) wanted.ranges.push_back(part.ranges[at(t)]);
-    if (part.blocks.empty()) continue;
-    const auto of_tile = std::span(part.blocks).subspan(at(t * blocks), at(blocks));
+    slots[at(t)] = to_int(static_cast<std::int64_t>(tiles.size()));
+    tiles.push_back({t % across * tile, t / across * tile});
+  }
+  slots_.emplace(state_, std::span<const cl_int>(slots), "tiles of nodes");
+  nodes_.emplace(state_,
+                 std::max<std::size_t>(1, tiles.size()) * count(tile * tile * rows_padded_) + count(room),
+                 "nodes of the field to verify against");
+  if (tiles.empty() || cone_) nodes_->fill(0.0f);
+  if (tiles.empty()) return;
+  if (cone_) {
+    make_cone_nodes(std::move(tiles));
+    return;
+  }
+  make_steps(tiles);
+  // All parts have tables of one size, whose pages cost time to get.
+  if (!table_) table_ = std::make_unique<Table>(state_, columns_, views_at_once());
+  calls_ = (g.views() + table_->views - 1) / table_->views;
+  for (std::int64_t row = 0; row < rows; row += row_lanes) back_project(row);
+}
+
+void VerifyNodes::make_cone_nodes(std::vector<std::array<std::int64_t, 2>> tiles) {
+  VerifyConeNodes::Nodes wanted;
+  const std::array<std::int64_t, 3> first{part_.first_x, part_.first_y, part_.first_z};
+  for (std::size_t a = 0; a < 3; ++a) {
+    wanted.spacing[a] = grid_.spacing[a] / static_cast<double>(a < 2 ? part_.across : part_.along);
+    wanted.first[a] = grid_.origin[a] + static_cast<double>(first[a]) * wanted.spacing[a];
+  }
+  wanted.heights = rows_padded_;
+  wanted.used = part_.nz;
+  wanted.tiles = std::move(tiles);
+  const std::int64_t blocks = part_.blocks_along();
+  for (std::size_t t = 0; t < part_.tiles.size(); ++t) {
+    if (!part_.tiles[t]) continue;
+    if (!part_.ranges.empty()) wanted.ranges.push_back(part_.ranges[t]);
+    if (part_.blocks.empty()) continue;
+    const auto of_tile = std::span(part_.blocks).subspan(t * at(blocks), at(blocks));
     wanted.blocks.insert(wanted.blocks.end(), of_tile.begin(), of_tile.end());
   }
   cone_facts_ = cone_->make(wanted, *nodes_);
 }
 
-void VerifyNodes::back_project(Table& table, std::int64_t first_row) {
+void VerifyNodes::back_project(std::int64_t first_row) {
+  const Table& table = *table_;
   const std::int64_t K = field_.geometry().views();
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrVerifyRows> kernel(
+  const std::uint64_t tiles = steps_->size() / count(K);
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrVerifyRows> kernel(
       state_, "verify/witness/verify_nodes", "verify_nodes",
       opencl::height_defines(state_.info, to_int(row_lanes)));
   const std::uint64_t in_row = count(row_lanes / opencl::lanes_of(state_.info, to_int(row_lanes)));
   for (std::int64_t first = 0; first < K; first += table.views) {
-    fill(table, first_row, first);
+    fill(first_row, first);
     const VdvrVerifyRows rows{.accumulate = first > 0 ? 1 : 0,
                               .first_view = to_int(first),
                               .views = to_int(table.filled),
                               .all_views = to_int(K),
                               .columns = to_int(columns_),
-                              .tiles = to_int(static_cast<std::int64_t>(tiles_->size())),
-                              .nx = to_int(tile_columns_ * tile),
+                              .tiles = to_int(static_cast<std::int64_t>(tiles)),
                               .rows_padded = to_int(rows_padded_),
                               .first_row = to_int(first_row)};
-    kernel(opencl::in_groups(state_.info, {in_row, count(tile), tiles_->size()}, {1, count(tile), 1}),
-           nodes_->buffer(), table.device.buffer(), steps_->buffer(), tiles_->buffer(), rows);
+    kernel(opencl::in_groups(state_.info, {in_row, count(tile), tiles}, {1, count(tile), 1}),
+           nodes_->buffer(), table.device.buffer(), steps_->buffer(), rows);
   }
 }
 
@@ -291,28 +319,28 @@ void VerifyNodes::gold(const Blocks& b, const opencl::DeviceArray<float>& values
   const opencl::DeviceArray<float> weights(state_, std::span<const float>(h.weights), "product along z");
   const opencl::Defines defines = opencl::height_defines(state_.info, to_int(row_lanes));
   const std::uint64_t in_group = count(row_lanes / opencl::lanes_of(state_.info, to_int(row_lanes)));
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrVerifyHeights> along(
-      state_, "verify/witness/verify_nodes", "verify_heights", defines);
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrVerifyHeights>
+      along(state_, "verify/witness/verify_nodes", "verify_heights", defines);
   const VdvrVerifyHeights shape{.blocks = to_int(blocks),
                                 .nx = to_int(n),
                                 .ny = to_int(n),
                                 .groups = to_int(groups),
-                                .all_x = to_int(tile_columns_ * tile),
-                                .all_y = to_int(tiles_across(part_.ny) * tile),
+                                .tiles_x = to_int(tiles_across(part_.nx)),
+                                .tiles_y = to_int(tiles_across(part_.ny)),
                                 .rows_padded = to_int(rows_padded_)};
   const opencl::Range heights =
       opencl::in_groups(state_.info, {in_group * count(groups), count((n + 7) / 8), count(n * blocks)},
                         {count(groups), count((n + 7) / 8), 1});
   if (factor == 1) {
     along(heights, values.buffer(), nodes_->buffer(), weights.buffer(), bands.buffer(),
-          device_places.buffer(), shape);
+          device_places.buffer(), slots_->buffer(), shape);
     return;
   }
   const opencl::DeviceArray<float> first(state_, count(blocks * n * n * b.z_padded + room),
                                          "nodes at heights"),
       second(state_, count(blocks * b.nx * n * b.z_padded + room), "rows of gold");
   along(heights, first.buffer(), nodes_->buffer(), weights.buffer(), bands.buffer(), device_places.buffer(),
-        shape);
+        slots_->buffer(), shape);
   const LagrangeFilter filter = lagrange_filter(to_int(factor));
   const opencl::DeviceArray<float> taps(state_, std::span<const float>(filter.weights), "Lagrange's weights");
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrVerifyBetween> between(
@@ -344,7 +372,7 @@ NodePath VerifyNodes::path(const Part& part, int rate) const {
   p.terms = part.rows ? g.rows : row_lanes + lagrange_points;
   p.gain = part.rows ? gain_ : 1;
   if (cone_) return p;
-  p.calls = (g.views() + views_at_once() - 1) / views_at_once();
+  p.calls = calls_;
   const auto n = static_cast<double>(part.across);
   p.density = density_;
   p.reach = density_ / g.pitch_u * std::hypot(grid_.spacing[0] / n, grid_.spacing[1] / n) *

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -41,7 +42,7 @@ class VerifyNodes {
   static std::int64_t tiles_across(std::int64_t nodes) {
     return (nodes + VDVR_VERIFY_TILE - 1) / VDVR_VERIFY_TILE;
   }
-  /// What a part of that size takes of the device.
+  /// What the wanted tiles of a part take of the device.
   [[nodiscard]] std::uint64_t bytes_of(const Part& part) const;
 
   /// Blocks of gold, all with the same heights. Places count gold nodes from the grid's first sample.
@@ -60,10 +61,15 @@ class VerifyNodes {
   /// Of cone beam: parts are of heights. `coverage` outlives this object.
   VerifyNodes(opencl::State& state, const ExactField& field, const Coverage& coverage, const Grid& grid,
               double unit, double furthest);
+  ~VerifyNodes();
+  VerifyNodes(const VerifyNodes&) = delete;
+  VerifyNodes& operator=(const VerifyNodes&) = delete;
 
   /// Back-projects. Cost (of cone beam, cone_nodes.hpp): rows * columns * (rows + 30 log2(columns))
   /// multiply-adds a view on the host, 7 multiply-adds a view and value on the device.
   void make(const Part& part);
+  /// Gives back the memory of the part made last, and of what further parts would use again.
+  void release();
 
   /// float gold[block][y][x][z_padded] of the part made last. Nodes without a complete stencil in it are
   /// finite and mean nothing.
@@ -79,9 +85,10 @@ class VerifyNodes {
  private:
   struct Table;
   struct Heights;
-  void make_cone_nodes(const Part& part);
-  void fill(Table& table, std::int64_t first_row, std::int64_t first_view);
-  void back_project(Table& table, std::int64_t first_row);
+  void make_steps(const std::vector<std::array<std::int64_t, 2>>& tiles);
+  void make_cone_nodes(std::vector<std::array<std::int64_t, 2>> tiles);
+  void fill(std::int64_t first_row, std::int64_t first_view);
+  void back_project(std::int64_t first_row);
   [[nodiscard]] Heights heights_of(const Blocks& blocks) const;
   [[nodiscard]] std::int64_t views_at_once() const;
 
@@ -96,10 +103,12 @@ class VerifyNodes {
   std::optional<VerifyConeNodes> cone_;
   ConeNodeFacts cone_facts_;
   Part part_;
-  std::int64_t tile_columns_ = 0, rows_padded_ = 0;
+  std::int64_t rows_padded_ = 0;
   std::optional<opencl::DeviceArray<float>> nodes_;
-  std::optional<opencl::DeviceArray<cl_int2>> tiles_;
+  std::optional<opencl::DeviceArray<cl_int>> slots_;  // [tile y][tile x]: its place among those wanted
   std::optional<opencl::DeviceArray<cl_float4>> steps_;
+  std::unique_ptr<Table> table_;
+  std::int64_t calls_ = 1;  // sums of views of the part made last
 };
 
 }  // namespace vdvr

@@ -1,9 +1,9 @@
 // How `verify` back-projects nodes of cone beam, apart from everything that build uses: lambda^-2 q(u, v) by
 // eight points of Lagrange both ways (docs/error-bounds.md, "What verify does", "Cone beam").
-// Layouts: float table[view][column][row]; View numbers[tile][block][view]; int2 tiles[tile] = first node x,
-// y; uchar wanted[tile][block]; uchar4 ranges[tile] = first and last x, then y; float
-// nodes[y][x][all_heights]. What reads like kept/cone_nodes.cl is written a second time: a fault in a shared
-// line would be in what is certified and in what it is held to. Called by host/verify/witness/cone_nodes.cpp.
+// Layouts: float table[view][column][row]; View numbers[tile][block][view]; float
+// nodes[slot][y][x][all_heights]; int slots[tile]; uchar wanted[tile][block]; uchar4 ranges[tile] = first and
+// last x, then y. What reads like kept/cone_nodes.cl is written a second time: a fault in a shared line would
+// be in what is certified and in what it is held to. Called by host/verify/witness/cone_nodes.cpp.
 #include "device/lanes.h"
 #include "shared/verify_cone.h"
 #include "shared/verify_nodes.h"
@@ -132,7 +132,7 @@ static inline ALWAYS_INLINE void add_views(float8* of, const Seen* seen, int vie
 
 // Adds the table's views at a block of heights of eight nodes along x.
 __kernel void verify_cone(__global float* nodes, __global const float* table, __global const View* numbers,
-                          __global const int2* tiles, __global const uchar* wanted,
+                          __global const int* slots, __global const uchar* wanted,
                           __global const uchar4* ranges, VdvrVerifyCone s) {
   const int block = (int)get_global_id(0), y = (int)get_global_id(1), tile = (int)get_global_id(2);
   if (block >= s.blocks || y >= VDVR_VERIFY_TILE || tile >= s.tiles) return;
@@ -142,7 +142,7 @@ __kernel void verify_cone(__global float* nodes, __global const float* table, __
   const int last_column = s.columns - 8, last_row = s.rows - 8;
   const size_t plane_size = (size_t)s.columns * (size_t)s.rows;
   const float dy = (float)y - 0.5f * (float)(VDVR_VERIFY_TILE - 1);
-  const int2 first = tiles[s.first_tile + tile];
+  const int slot = slots[s.first_tile + tile];
   __global const View* own = numbers + ((size_t)tile * s.blocks + block) * s.views;
   float8 sums[VDVR_VERIFY_TILE * VDVR_VERIFY_CONE_BLOCK];
   for (int i = 0; i < VDVR_VERIFY_TILE * VDVR_VERIFY_CONE_BLOCK; ++i) sums[i] = (float8)(0.0f);
@@ -161,7 +161,8 @@ __kernel void verify_cone(__global float* nodes, __global const float* table, __
     }
   }
   for (int x = range.x; x <= range.y; ++x) {
-    __global float* to = nodes + ((size_t)(first.y + y) * s.nx + (size_t)(first.x + x)) * s.all_heights +
+    __global float* to = nodes +
+                         (size_t)((slot * VDVR_VERIFY_TILE + y) * VDVR_VERIFY_TILE + x) * s.all_heights +
                          block * VDVR_VERIFY_CONE_BLOCK;
     for (int i = 0; i < VDVR_VERIFY_CONE_BLOCK; ++i) {
       const float sum = sum_of(sums[x * VDVR_VERIFY_CONE_BLOCK + i]);
@@ -185,7 +186,7 @@ __kernel void verify_cone(__global float* nodes, __global const float* table, __
 // Adds the table's views at VDVR_LANES heights of eight nodes along x. VDVR_UPRIGHT: u and lambda do not
 // change along z in any view.
 __kernel void verify_cone(__global float* nodes, __global const float* table, __global const View* numbers,
-                          __global const int2* tiles, __global const uchar* wanted,
+                          __global const int* slots, __global const uchar* wanted,
                           __global const uchar4* ranges, VdvrVerifyCone s) {
   const int height = (int)get_global_id(0) * VDVR_LANES, y = (int)get_global_id(1),
             tile = (int)get_global_id(2), block = height / VDVR_VERIFY_CONE_BLOCK;
@@ -200,7 +201,7 @@ __kernel void verify_cone(__global float* nodes, __global const float* table, __
   const float dy = (float)y - 0.5f * (float)(VDVR_VERIFY_TILE - 1);
   const VEC dz =
       TO_VEC(height - block * VDVR_VERIFY_CONE_BLOCK + INDEX) - 0.5f * (float)(VDVR_VERIFY_CONE_BLOCK - 1);
-  const int2 first = tiles[s.first_tile + tile];
+  const int slot = slots[s.first_tile + tile];
   __global const View* own = numbers + ((size_t)tile * s.blocks + block) * views;
   for (int x = range.x; x <= range.y; ++x) {
     const float dx = (float)x - 0.5f * (float)(VDVR_VERIFY_TILE - 1);
@@ -229,7 +230,7 @@ __kernel void verify_cone(__global float* nodes, __global const float* table, __
       FOR_LANES(PART)
     }
     __global float* to =
-        nodes + ((size_t)(first.y + y) * s.nx + (size_t)(first.x + x)) * s.all_heights + height;
+        nodes + (size_t)((slot * VDVR_VERIFY_TILE + y) * VDVR_VERIFY_TILE + x) * s.all_heights + height;
     FOR_LANES(PUT)
   }
 }

@@ -1,9 +1,9 @@
 // How `verify` makes F, apart from everything that build uses: back-projection of nodes by six points of
 // Lagrange in u, a product along z to the heights of gold, and twelve points of Lagrange across z
 // (docs/error-bounds.md, "What verify does", step 1).
-// Layouts: float table[view][fine column][16], 16 rows or heights; float nodes[y][x][rows_padded]; int2
-// tiles[tile] = first node x, y of a tile; float gold[block][y][x][16 * groups].
-// Called by host/verify/witness/nodes.cpp.
+// Layouts: float table[view][fine column][16], 16 rows or heights; float nodes[wanted
+// tile][y][x][rows_padded]; int slots[tile y][tile x]: which wanted tile that is, 0 where it is none; float
+// gold[block][y][x][16 * groups]. Called by host/verify/witness/nodes.cpp.
 #include "device/lanes.h"
 #include "shared/verify_nodes.h"
 
@@ -41,13 +41,13 @@
 // Adds the table's views at VDVR_LANES of its 16 rows. steps: per tile and view of the scan {columns per node
 // along x, along y, the tile's first node less a whole number of columns, that whole number}.
 __kernel void verify_nodes(__global float* nodes, __global const float* table, __global const float4* steps,
-                           __global const int2* tiles, VdvrVerifyRows s) {
+                           VdvrVerifyRows s) {
   const int row = (int)get_global_id(0) * VDVR_LANES, y = (int)get_global_id(1), tile = (int)get_global_id(2);
   if (row >= 16 || y >= VDVR_VERIFY_TILE || tile >= s.tiles) return;
   // Copies, which no store can be taken to change.
   const int accumulate = s.accumulate, views = s.views, columns = s.columns;
   __global float* target =
-      nodes + ((size_t)(tiles[tile].y + y) * s.nx + tiles[tile].x) * s.rows_padded + s.first_row + row;
+      nodes + ((size_t)tile * VDVR_VERIFY_TILE + y) * VDVR_VERIFY_TILE * s.rows_padded + s.first_row + row;
   __global const float4* view = steps + (size_t)tile * s.all_views + s.first_view;
   __global const float* plane = table + row;
   const float8 along = (float8)(0, 1, 2, 3, 4, 5, 6, 7);
@@ -77,24 +77,30 @@ __kernel void verify_nodes(__global float* nodes, __global const float* table, _
 
 // --- along z ---
 
-#define FROM(i, lane)             \
-  __global const float* from##i = \
-      nodes + ((size_t)y * s.all_x + clamp(place.x + x + i, 0, s.all_x - 1)) * s.rows_padded + rows.x;
+#define FROM(i, lane)                                                                                   \
+  const int x##i = clamp(place.x + x + i, 0, s.tiles_x * VDVR_VERIFY_TILE - 1),                         \
+            node##i =                                                                                   \
+                (tile_row[x##i / VDVR_VERIFY_TILE] * VDVR_VERIFY_TILE + in_tile_y) * VDVR_VERIFY_TILE + \
+                x##i % VDVR_VERIFY_TILE;                                                                \
+  __global const float* from##i = nodes + (size_t)node##i * s.rows_padded + rows.x;
 #define MULTIPLY(i, lane) sum##i = fma(w, (VEC)(from##i[r]), sum##i);
 #define PUT_HEIGHTS(i, lane) \
   if (x + i < s.nx) WRITE(total##i + lost##i, to + (size_t)i * s.groups * 16);
 
 // matrix: per group of 16 heights its weights [row][16], from the row bands[group] = {first row, rows, where
-// its weights begin in units of 16}. places: the blocks' first nodes x, y in `nodes`.
+// its weights begin in units of 16}. places: the blocks' first nodes x, y in the part.
 __kernel void verify_heights(__global float* gold, __global const float* nodes, __global const float* matrix,
-                             __global const int4* bands, __global const int2* places, VdvrVerifyHeights s) {
+                             __global const int4* bands, __global const int2* places,
+                             __global const int* slots, VdvrVerifyHeights s) {
   const int height = (int)get_global_id(0) * VDVR_LANES, group = height / 16, lane = height - group * 16,
             x = (int)get_global_id(1) * 8;
   const int block = (int)get_global_id(2) / s.ny, block_y = (int)get_global_id(2) - block * s.ny;
   if (group >= s.groups || x >= s.nx || block >= s.blocks) return;
   const int2 place = places[block];
   const int4 rows = bands[group];
-  const int y = clamp(place.y + block_y, 0, s.all_y - 1);
+  const int y = clamp(place.y + block_y, 0, s.tiles_y * VDVR_VERIFY_TILE - 1),
+            in_tile_y = y % VDVR_VERIFY_TILE;
+  __global const int* tile_row = slots + (size_t)(y / VDVR_VERIFY_TILE) * s.tiles_x;
   __global float* to = gold + ((((size_t)block * s.ny + block_y) * s.nx + x) * s.groups + group) * 16 + lane;
   __global const float* weights = matrix + (size_t)rows.z * 16 + lane;
   FOR_TILE(FROM)
