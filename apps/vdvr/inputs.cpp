@@ -231,8 +231,10 @@ ProjectionSet load_scan_to_verify(const fs::path& path, const Arguments& args, c
   measured.preparation.half_acquisition = false;
   measured.preparation.padding = Padding::none;
   measured.preparation.heights = Heights::as_seen;
-  return checked(
-      rows_to_verify(load_as_stated(path, args, certificate, measured, progress), certificate.field), path);
+  const CommonOptions common = common_options(args);
+  return checked(rows_to_verify(load_as_stated(path, args, certificate, measured, progress),
+                                certificate.field, common.max_memory, common.scratch),
+                 path);
 }
 
 // --- the noise of scans ---

@@ -105,7 +105,10 @@ FileVerification verified(Device& device, const VdvrFile& file, const Projection
     const std::lock_guard turn(hdf5_turn());
     rows = read_scan(source->path, measured, report);
   }
-  return verify_file(device, file, rows_to_verify(std::move(rows), file.certificate.field), options, report);
+  return verify_file(
+      device, file,
+      rows_to_verify(std::move(rows), file.certificate.field, measured.max_memory_bytes, measured.scratch),
+      options, report);
 }
 
 FileVerification verify_held(Device& device, HeldVolume& held, const ProjectionSet& scan,

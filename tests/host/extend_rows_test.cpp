@@ -101,6 +101,12 @@ BOOST_AUTO_TEST_CASE(verify_makes_the_same_rows_to_the_bit_by_means_of_its_own) 
     BOOST_TEST((again.geometry == scan.geometry));
     BOOST_TEST((again.report.preparation == scan.report.preparation));
     BOOST_TEST((again.data == scan.data));
+    // Beyond the limit longer rows lie in a scratch file, wherever those lay that were measured.
+    const bool longer = scan.geometry.columns > columns;
+    const std::uint64_t limit = 8 * sizeof(float) * own.data.size();
+    const ProjectionSet mapped = rows_to_verify(own, field, limit);
+    BOOST_TEST((mapped.data.scratch() != nullptr) == longer);
+    BOOST_TEST((mapped.data == scan.data));
   }
 }
 

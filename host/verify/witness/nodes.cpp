@@ -24,7 +24,7 @@ namespace {
 using std::numbers::pi;
 constexpr std::int64_t row_lanes = 16;           // of a vector along z
 constexpr std::int64_t tile = VDVR_VERIFY_TILE;  // nodes of its side
-constexpr std::int64_t room = 64;                // floats after a buffer's end that vectors may touch
+constexpr std::int64_t beyond = 64;              // floats after a buffer's end that vectors may touch
 constexpr std::int64_t before = 5;               // nodes that a polynomial takes before the place
 
 std::int64_t up(std::int64_t n, std::int64_t multiple) { return (n + multiple - 1) / multiple * multiple; }
@@ -86,7 +86,7 @@ struct VerifyNodes::Table {
         per_view(columns * row_lanes),
         views(at_once),
         counted(of, bytes(), "fine columns of the filtered projections") {
-    device = opencl::DeviceArray<float>(state, count(views * per_view + room),
+    device = opencl::DeviceArray<float>(state, count(views * per_view + beyond),
                                         "fine columns of the filtered projections");
   }
   ~Table() = default;
@@ -196,7 +196,7 @@ void VerifyNodes::make(const Part& part) {
   }
   slots_.emplace(state_, std::span<const cl_int>(slots), "tiles of nodes");
   nodes_.emplace(state_,
-                 std::max<std::size_t>(1, tiles.size()) * count(tile * tile * rows_padded_) + count(room),
+                 std::max<std::size_t>(1, tiles.size()) * count(tile * tile * rows_padded_) + count(beyond),
                  "nodes of the field to verify against");
   if (tiles.empty() || cone_) nodes_->fill(0.0f);
   if (tiles.empty()) return;
@@ -336,9 +336,9 @@ void VerifyNodes::gold(const Blocks& b, const opencl::DeviceArray<float>& values
           device_places.buffer(), slots_->buffer(), shape);
     return;
   }
-  const opencl::DeviceArray<float> first(state_, count(blocks * n * n * b.z_padded + room),
+  const opencl::DeviceArray<float> first(state_, count(blocks * n * n * b.z_padded + beyond),
                                          "nodes at heights"),
-      second(state_, count(blocks * b.nx * n * b.z_padded + room), "rows of gold");
+      second(state_, count(blocks * b.nx * n * b.z_padded + beyond), "rows of gold");
   along(heights, first.buffer(), nodes_->buffer(), weights.buffer(), bands.buffer(), device_places.buffer(),
         slots_->buffer(), shape);
   const LagrangeFilter filter = lagrange_filter(to_int(factor));

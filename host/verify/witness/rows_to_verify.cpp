@@ -76,7 +76,7 @@ LongerRow longer_row(const ParallelGeometry& own, bool half, Padding padding) {
 }
 
 // Each view's rows at the heights that all views see.
-void to_common_heights(ProjectionSet& scan) {
+void to_common_heights(ProjectionSet& scan, const RowsRoom& room) {
   ParallelGeometry& g = scan.geometry;
   const long double top = *std::max_element(g.row_shift.begin(), g.row_shift.end()),
                     bottom = *std::min_element(g.row_shift.begin(), g.row_shift.end());
@@ -87,7 +87,8 @@ void to_common_heights(ProjectionSet& scan) {
   if (common < 1) throw InputError("rows_to_verify: views share no height");
   const std::int64_t n = g.rows, U = g.columns;
   const SeriesWeights series(n);
-  SampleArray out(at(g.views() * common * U), scan.data.scratch(), "the projections at common heights");
+  SampleArray out(at(g.views() * common * U), room(g.views(), common, U),
+                  "the projections at common heights");
   parallel_for(g.views(), {}, "heights to verify", [&](std::int64_t k) {
     for (std::int64_t j = 0; j < common; ++j) {
       // From the middle of the rows to the middle of the heights.
@@ -117,7 +118,12 @@ void to_common_heights(ProjectionSet& scan) {
 
 }  // namespace
 
-ProjectionSet rows_to_verify(ProjectionSet measured, const FieldOptions& field) {
+ProjectionSet rows_to_verify(ProjectionSet measured, const FieldOptions& field,
+                             std::uint64_t max_memory_bytes, const std::filesystem::path& scratch) {
+  const RowsRoom room = [&](std::int64_t views, std::int64_t rows, std::int64_t columns) {
+    const std::shared_ptr<Scratch> own = measured.data.scratch();
+    return own ? own : scratch_for_scan(views, rows, columns, max_memory_bytes, scratch);
+  };
   const bool half = field.preparation.half_acquisition.value_or(false);
   const Padding padding = field.preparation.padding;
   ParallelGeometry& g = measured.geometry;
@@ -130,9 +136,9 @@ ProjectionSet rows_to_verify(ProjectionSet measured, const FieldOptions& field) 
         "rows_to_verify: heights are not as the certificate says: give the scan's own rows, shifts and roll "
         "of "
         "the axis");
-  if (heights == Heights::all) to_all_heights(measured, half);
-  else if (g.axis_roll_deg != 0) to_upright_rows(measured);
-  else if (heights == Heights::common) to_common_heights(measured);
+  if (heights == Heights::all) to_all_heights(measured, half, room);
+  else if (g.axis_roll_deg != 0) to_upright_rows(measured, room);
+  else if (heights == Heights::common) to_common_heights(measured, room);
   measured.report.preparation.heights = field.preparation.heights;
   measured.report.preparation.half_acquisition = field.preparation.half_acquisition;
   measured.report.preparation.padding = padding;
@@ -146,7 +152,7 @@ ProjectionSet rows_to_verify(ProjectionSet measured, const FieldOptions& field) 
     throw InputError(fmt::format("centre {}: off the {} columns", g.center, g.columns));
   const LongerRow row = longer_row(g, half, padding);
   const std::int64_t U = g.columns, wide = std::ssize(row.sources), lines = g.views() * g.rows;
-  SampleArray longer(at(lines * wide), measured.data.scratch(), "the projections with longer rows");
+  SampleArray longer(at(lines * wide), room(g.views(), g.rows, wide), "the projections with longer rows");
   parallel_for(lines, {}, "rows to verify", [&](std::int64_t line) {
     for (std::int64_t j = 0; j < wide; ++j) {
       const Source& s = row.sources[at(j)];

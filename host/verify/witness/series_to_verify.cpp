@@ -204,7 +204,7 @@ void row_at(const float* view, const ParallelGeometry& g, const SeriesWeights& s
 
 }  // namespace
 
-void to_all_heights(ProjectionSet& scan, bool full_turn) {
+void to_all_heights(ProjectionSet& scan, bool full_turn, const RowsRoom& room) {
   ParallelGeometry& g = scan.geometry;
   const HeightsToVerify heights(g, full_turn);
   const Range range = covered(heights, g);
@@ -226,7 +226,8 @@ void to_all_heights(ProjectionSet& scan, bool full_turn) {
   });
   const std::int64_t views = std::ssize(parts.first), U = g.columns;
   const SeriesWeights series(g.rows);
-  SampleArray out(at(views * range.count * U), scan.data.scratch(), "the projections of a series of heights");
+  SampleArray out(at(views * range.count * U), room(views, range.count, U),
+                  "the projections of a series of heights");
   parallel_for(views, {}, "heights to verify", [&](std::int64_t view) {
     std::vector<long double> row(at(U)), sum(at(U));
     for (std::int64_t j = 0; j < range.count; ++j) {

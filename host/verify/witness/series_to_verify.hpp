@@ -4,12 +4,13 @@
 // each row by the barycentric formula.
 #pragma once
 
+#include "host/verify/witness/rows_room.hpp"
 #include "vdvr/expert/projections.hpp"
 
 namespace vdvr {
 
 /// In place; `scan` is as it was measured, with its shifts. `full_turn`: of half acquisition. Throws
 /// InputError where no height is covered.
-void to_all_heights(ProjectionSet& scan, bool full_turn);
+void to_all_heights(ProjectionSet& scan, bool full_turn, const RowsRoom& room);
 
 }  // namespace vdvr

@@ -130,7 +130,7 @@ std::vector<double> SeriesWeights::operator()(long double y) const {
   return weights;
 }
 
-void to_upright_rows(ProjectionSet& scan) {
+void to_upright_rows(ProjectionSet& scan, const RowsRoom& room) {
   ParallelGeometry& g = scan.geometry;
   const long double roll = static_cast<long double>(g.axis_roll_deg) * half_turn / 180;
   Lean lean{std::cos(roll), std::sin(roll),
@@ -142,7 +142,7 @@ void to_upright_rows(ProjectionSet& scan) {
     bottom = *std::min_element(g.row_shift.begin(), g.row_shift.end());
   }
   fit(lean, top - bottom);
-  SampleArray out(at(g.views() * lean.rows * lean.columns), scan.data.scratch(),
+  SampleArray out(at(g.views() * lean.rows * lean.columns), room(g.views(), lean.rows, lean.columns),
                   "the projections on upright rows");
   constexpr std::int64_t most_samples = std::int64_t{1} << 23;  // 64 MiB of doubles
   const std::int64_t together =

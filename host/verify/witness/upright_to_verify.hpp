@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "host/verify/witness/rows_room.hpp"
 #include "vdvr/expert/projections.hpp"
 
 namespace vdvr {
@@ -28,8 +29,8 @@ class SeriesWeights {
 };
 
 /// In place; `scan` is as it was measured, with the axis' roll. Throws InputError where nothing is left.
-/// Cost: views
-/// * rows * columns * (rows + columns) multiply-adds; where rows are shifted by view, as many weights too.
-void to_upright_rows(ProjectionSet& scan);
+/// Cost: views * rows * columns * (rows + columns) multiply-adds; where rows are shifted by view, as many
+/// weights too.
+void to_upright_rows(ProjectionSet& scan, const RowsRoom& room);
 
 }  // namespace vdvr
