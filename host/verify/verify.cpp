@@ -15,6 +15,7 @@
 #include "host/scan/units.hpp"
 #include "host/verify/claims/verify_scope.hpp"
 #include "host/verify/claims/verify_terms.hpp"
+#include "host/verify/bricks_to_verify.hpp"
 #include "host/verify/seams.hpp"
 #include "host/verify/verify_attack.hpp"
 #include "host/verify/verify_field.hpp"
@@ -30,51 +31,6 @@
 
 namespace vdvr {
 namespace {
-
-// The layers of bricks a sample is drawn from: each costs the filtered rows of its heights, so they are few.
-// The certificate's worst node is in one of them, the others are spread over the volume.
-std::vector<std::int64_t> layers_to_sample(std::int64_t count, std::int64_t worst, std::mt19937& random) {
-  constexpr std::int64_t most = 3;
-  std::vector<std::int64_t> layers{worst};
-  const std::int64_t others = std::min(count, most) - 1;
-  for (std::int64_t i = 0; i < others; ++i) {
-    const std::int64_t first = i * count / others, last = (i + 1) * count / others - 1;
-    const std::int64_t layer =
-        std::uniform_int_distribution<std::int64_t>(first, std::max(first, last))(random);
-    if (std::find(layers.begin(), layers.end(), layer) == layers.end()) layers.push_back(layer);
-  }
-  return layers;
-}
-
-// Every brick, or for each level the wanted share of its bricks and the one that holds the certificate's
-// worst node.
-std::vector<std::uint8_t> chosen_bricks(const MixedVolume& v, const Certificate& stored,
-                                        const VerifyOptions& options) {
-  const std::size_t n = v.level.size();
-  std::vector<std::uint8_t> selected(n, options.exhaustive ? 1 : 0);
-  const std::vector<std::uint8_t> by_roi = bricks_of(stored.roi, v.grid, v.granularity);
-  if (!options.exhaustive) {
-    const Index3 counts = v.bricks(), worst = brick_at(v, stored.worst_at);
-    std::mt19937 random(options.seed);
-    std::vector<std::int64_t> layers = layers_to_sample(counts[2], worst[2], random);
-    std::map<LevelTriple, std::vector<std::size_t>> strata;
-    for (const std::int64_t z : layers)
-      for (std::int64_t i = z * counts[0] * counts[1]; i < (z + 1) * counts[0] * counts[1]; ++i)
-        if (by_roi[at(i)]) strata[v.level[at(i)]].push_back(at(i));
-    const double share =
-        options.fraction * static_cast<double>(counts[2]) / static_cast<double>(layers.size());
-    for (auto& [level, members] : strata) {
-      std::shuffle(members.begin(), members.end(), random);
-      const auto wanted = std::max<std::size_t>(
-          8, static_cast<std::size_t>(std::ceil(share * static_cast<double>(members.size()))));
-      for (std::size_t i = 0; i < std::min(wanted, members.size()); ++i) selected[members[i]] = 1;
-    }
-    selected[at((worst[2] * counts[1] + worst[1]) * counts[0] + worst[0])] = 1;
-  }
-  for (std::size_t i = 0; i < n; ++i)
-    if (!by_roi[i]) selected[i] = 0;
-  return selected;
-}
 
 std::string place_text(const SamplePlace& p) {
   const std::string where = p.dataset == "/base" ? p.dataset : fmt::format("{} tile {}", p.dataset, p.tile);
@@ -408,12 +364,14 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
                               std::make_move_iterator(more.end()));
   };
   also(check_samplers(device, volume, stored, slopes, sampler));
-  const std::vector<std::uint8_t> selected = chosen_bricks(volume, stored, options);
   const CertifiedRegion region(scan, stored.field);
   TotalAttack attack(volume, stored, region);
   result.epsilon_abs = stored.epsilon_abs;
   result.bricks = static_cast<std::int64_t>(volume.level.size());
   VerifyField field(state, exact, volume, stored.window, progress, units_of(scan).density());
+  const std::vector<std::uint8_t> selected =
+      options.exhaustive ? all_bricks(volume, stored)
+                         : sample_of_bricks(volume, stored, options, field.rows_serve(layers_of_sample));
   const FieldPoints points_of_field(exact, region, volume, selected, options.seed);
   field.look_at(points_of_field.bricks(), points_of_field.nodes_each(), options.seed);
   TestedBricks tested(field, volume, attack,

@@ -63,6 +63,9 @@ class VerifyField {
   [[nodiscard]] int across() const { return across_; }
   /// Of cone beam: finer gold, which is made of more nodes around a brick, is better asked for by itself.
   [[nodiscard]] bool nodes_are_dear() const { return !field_.views().empty(); }
+  /// Of parallel beam, whether the detector's rows are no more than what so many layers of bricks take of
+  /// heights: then they are made, and serve all layers.
+  [[nodiscard]] bool rows_serve(std::int64_t layers) const;
   /// The least rate of gold on whose cells the brick is trilinear.
   [[nodiscard]] int least_rate(std::size_t brick) const;
 

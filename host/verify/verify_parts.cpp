@@ -49,6 +49,15 @@ std::vector<std::uint8_t> VerifyField::near_coverage(std::vector<std::uint8_t> s
   return selected;
 }
 
+bool VerifyField::rows_serve(std::int64_t layers) const {
+  if (!field_.views().empty()) return false;
+  int along = 1;
+  while (along < (1 << 24) && volume_.grid.spacing[2] / along > 0.25 * field_.geometry().pitch_v) along *= 2;
+  const std::int64_t of_layer =
+      std::int64_t{volume_.granularity} * along + 1 + 2 * (verify_halo + VerifyNodes::reach);
+  return field_.geometry().rows <= std::min(layers, volume_.bricks()[2]) * of_layer;
+}
+
 VerifyNodes::Part VerifyField::nodes_of(const std::vector<std::uint8_t>& selected, std::span<const int> rates,
                                         bool rows) const {
   const Index3 n = volume_.bricks();
