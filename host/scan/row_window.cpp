@@ -17,7 +17,9 @@ ProjectionSet rows_of(const ProjectionSet& scan, std::int64_t first, std::int64_
   out.geometry.series.first += first;
   out.report = scan.report;
   const std::int64_t run = rows * g.columns;
-  out.data = SampleArray(std::vector<float>(static_cast<std::size_t>(g.views() * run)));
+  // Beside the scan: kept gold goes where the scan lies, and the window is to cost what the whole does.
+  out.data =
+      SampleArray(static_cast<std::size_t>(g.views() * run), scan.data.scratch(), "a window of the rows");
   for (std::int64_t k = 0; k < g.views(); ++k)
     std::copy_n(scan.data.data() + (k * g.rows + first) * g.columns, run, out.data.data() + k * run);
   return out;
