@@ -46,6 +46,21 @@ VerifyNodes::Part part_of(const VerifyNodes::Part& shape, const Index3& first, c
   return p;
 }
 
+/// Only the tiles of `part` that hold a node of `inner`, which lies in it.
+VerifyNodes::Part narrowed(VerifyNodes::Part part, const VerifyNodes::Part& inner) {
+  constexpr std::int64_t side = VDVR_VERIFY_TILE;
+  const std::int64_t across = VerifyNodes::tiles_across(part.nx), x = inner.first_x - part.first_x,
+                     y = inner.first_y - part.first_y;
+  for (std::int64_t t = 0; t < std::ssize(part.tiles); ++t) {
+    const std::int64_t tx = t % across, ty = t / across;
+    part.tiles[at(t)] =
+        tx >= x / side && tx <= (x + inner.nx - 1) / side && ty >= y / side && ty <= (y + inner.ny - 1) / side
+            ? 1
+            : 0;
+  }
+  return part;
+}
+
 struct Gold {
   std::int64_t n = 0, nz = 0, z_padded = 0;
   std::vector<float> values;
@@ -221,15 +236,23 @@ BOOST_AUTO_TEST_CASE(a_block_in_the_whole_is_the_block_alone) {
       const VerifyNodes::Part whole = part_of(shape, {0, 0, 0}, grid.cells, rate);
       nodes.make(whole);
       const Gold in_whole = gold_of(support::device().state(), nodes, first, end, rate);
-      nodes.make(part_of(shape, first, end, rate));
+      const VerifyNodes::Part own = part_of(shape, first, end, rate);
+      nodes.make(own);
       const Gold alone = gold_of(support::device().state(), nodes, first, end, rate);
+      const VerifyNodes::Part few = narrowed(whole, own);
+      BOOST_TEST(nodes.bytes_of(few) < nodes.bytes_of(whole));
+      nodes.make(few);
+      const Gold of_few = gold_of(support::device().state(), nodes, first, end, rate);
       BOOST_TEST(in_whole.n == alone.n);
-      std::int64_t different = 0;
+      std::int64_t different = 0, different_of_few = 0;
       for (std::int64_t y = 0; y < alone.n; ++y)
         for (std::int64_t x = 0; x < alone.n; ++x)
-          for (std::int64_t z = 0; z < alone.nz; ++z)
+          for (std::int64_t z = 0; z < alone.nz; ++z) {
             different += in_whole.value(x, y, z) != alone.value(x, y, z) ? 1 : 0;
+            different_of_few += in_whole.value(x, y, z) != of_few.value(x, y, z) ? 1 : 0;
+          }
       BOOST_TEST(different == 0, "rate " << rate << (rows ? ", rows" : ", heights"));
+      BOOST_TEST(different_of_few == 0, "rate " << rate << (rows ? ", rows" : ", heights"));
     }
   }
 }
