@@ -104,6 +104,8 @@ class VerifyField {
                                            std::span<const int> rates) const;
   [[nodiscard]] std::vector<std::vector<std::uint8_t>> joined(
       std::vector<std::vector<std::uint8_t>> layers, const std::vector<std::uint8_t>& selected) const;
+  /// Heights to a cell of the grid that determine F along z, or `most`.
+  [[nodiscard]] int nodes_along(int most) const;
   [[nodiscard]] VerifyNodes::Part nodes_of(const std::vector<std::uint8_t>& selected,
                                            std::span<const int> rates, bool rows) const;
   [[nodiscard]] Shape shape_at(int rate, bool many, const VerifyNodes::Part& part) const;

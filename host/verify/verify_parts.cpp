@@ -49,12 +49,20 @@ std::vector<std::uint8_t> VerifyField::near_coverage(std::vector<std::uint8_t> s
   return selected;
 }
 
+int VerifyField::nodes_along(int most) const {
+  const auto dense = [&](int along) {
+    return field_.views().empty() ? volume_.grid.spacing[2] / along <= 0.25 * field_.geometry().pitch_v
+                                  : along >= rates_of_cone_.along;
+  };
+  int along = 1;
+  while (along < most && !dense(along)) along *= 2;
+  return along;
+}
+
 bool VerifyField::rows_serve(std::int64_t layers) const {
   if (!field_.views().empty()) return false;
-  int along = 1;
-  while (along < (1 << 24) && volume_.grid.spacing[2] / along > 0.25 * field_.geometry().pitch_v) along *= 2;
   const std::int64_t of_layer =
-      std::int64_t{volume_.granularity} * along + 1 + 2 * (verify_halo + VerifyNodes::reach);
+      std::int64_t{volume_.granularity} * nodes_along(1 << 24) + 1 + 2 * (verify_halo + VerifyNodes::reach);
   return field_.geometry().rows <= std::min(layers, volume_.bricks()[2]) * of_layer;
 }
 
@@ -72,12 +80,7 @@ VerifyNodes::Part VerifyField::nodes_of(const std::vector<std::uint8_t>& selecte
   p.ny = (box.end[1] - box.first[1]) * side + 1 + 2 * around;
   p.rows = rows;
   if (!rows) {
-    p.along = 1;
-    const auto dense = [&](int along) {
-      return field_.views().empty() ? volume_.grid.spacing[2] / along <= 0.25 * field_.geometry().pitch_v
-                                    : along >= rates_of_cone_.along;
-    };
-    while (p.along < rates.back() && !dense(p.along)) p.along *= 2;
+    p.along = nodes_along(rates.back());
     const std::int64_t tall = std::int64_t{volume_.granularity} * p.along;
     // Steps of the coarsest rate, and a polynomial's nodes.
     const std::int64_t beyond = verify_halo * std::max<std::int64_t>(1, p.along / rates.front()) +
