@@ -64,6 +64,17 @@ BOOST_AUTO_TEST_CASE(a_brick_without_coarser_neighbours_rises_along_the_axis_tha
   BOOST_TEST((raised(pair_of({0, 1, 1}, {0, 1, 1}), 0, inside)[0] == LevelTriple{1, 1, 1}));
 }
 
+// Once, bricks at an edge along y rose to gold along x and z, whose errors were small, since twice the
+// samples along y did not err less: thrice the samples of the whole volume.
+BOOST_AUTO_TEST_CASE(an_axis_whose_error_falls_late_still_rises_first) {
+  AxisErrors along;
+  along.of[0] = {{{0.2f, 0}, {0.05f, 0}, {0.01f, 0}}};
+  along.of[1] = {{{1, 0}, {0, 1}, {0.3f, 0}}};
+  BOOST_TEST((raised(pair_of({0, 0, 0}, {0, 0, 0}), 0, inside, along)[0] == LevelTriple{0, 1, 0}));
+  BOOST_TEST((raised(pair_of({0, 1, 0}, {0, 1, 0}), 0, inside, along)[0] == LevelTriple{0, 2, 0}));
+  BOOST_TEST((raised(pair_of({0, 3, 0}, {0, 3, 0}), 0, inside, along)[0] == LevelTriple{0, 3, 1}));
+}
+
 // What a corner holds is what the coarsest brick there stores: once, four bricks of a real scan rose to gold
 // for a base sample that none of them stored.
 BOOST_AUTO_TEST_CASE(a_corner_raises_the_coarsest_that_meet_there) {

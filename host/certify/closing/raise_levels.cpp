@@ -105,14 +105,16 @@ class Raise {
     // Samples a cell, as log2.
     const auto density = [&](std::size_t zyx) { return own[zyx] - bricks_.coarsening[zyx]; };
     const int lowest = std::min({density(0), density(1), density(2)});
+    // By what an axis errs, not by what its next level saves: an error can fall only some levels on, and the
+    // other axes would rise to gold before it for next to nothing.
     std::size_t worst = 3;
-    float gain = 0;
+    float most = 0;
     for (std::size_t a = 0; along_ && a < 3; ++a) {
       const int level = own[2 - a], top = top_[2 - a];
-      const float g = error(*along_, a, level, top) - error(*along_, a, level + 1, top);
-      if (level >= top || g <= gain) continue;
+      const float errs = error(*along_, a, level, top);
+      if (level >= top || errs <= most) continue;
       worst = a;
-      gain = g;
+      most = errs;
     }
     for (std::size_t a = 0; a < 3; ++a)
       if (worst < 3 ? a == worst : density(2 - a) == lowest)
