@@ -406,6 +406,45 @@ BOOST_AUTO_TEST_CASE(a_brick_asked_for_alone_has_the_bound_that_it_has_among_all
   }
 }
 
+// What one process knows it tells another, which then looks at the rest alone.
+BOOST_AUTO_TEST_CASE(what_is_known_of_a_part_of_a_block_can_be_told) {
+  const ProjectionSet noise = testing::noise_scan(15, 9, 33, 1);
+  attacks::Chain chain(noise);
+  const Grid grid = grid_in({20, 20, 20}, {1, 1, 1}, {-10, -10, -10});
+  const GoldSettings settings = settings_of(grid, 2);
+  const Bricks bricks(grid, 2);
+  const auto among = [&](std::int64_t step) {
+    std::vector<std::uint8_t> selected(static_cast<std::size_t>(bricks.size()), 0);
+    for (std::int64_t i = 0; i < bricks.size(); i += step) selected[static_cast<std::size_t>(i)] = 1;
+    return selected;
+  };
+  const auto size = [](const BrickRemainder::Block& b) { return b.bricks[0] * b.bricks[1] * b.bricks[2]; };
+  const auto sizes = [&](const std::vector<BrickRemainder::Block>& blocks) {
+    std::int64_t sum = 0;
+    for (const BrickRemainder::Block& b : blocks) sum += size(b);
+    return sum;
+  };
+  GoldSource all(device().state(), chain.filtered, chain.sups, settings),
+      teller(device().state(), chain.filtered, chain.sups, settings),
+      told(device().state(), chain.filtered, chain.sups, settings);
+  all.remainder->require(among(1), {});
+  const std::int64_t whole = sizes(all.remainder->known());
+  BOOST_TEST(sizes(teller.remainder->open(among(1))) == whole);
+  BOOST_TEST(sizes(teller.remainder->open(among(333))) < whole);
+  teller.remainder->require(among(333), {});
+  BOOST_TEST(teller.remainder->open(among(333)).empty());
+  const std::vector<BrickRemainder::Block> known = teller.remainder->known();
+  BOOST_TEST(sizes(known) > 0);
+  BOOST_TEST(sizes(known) < whole);
+  for (const BrickRemainder::Block& b : known) told.remainder->take(b, teller.remainder->found(b));
+  BOOST_TEST(told.remainder->open(among(333)).empty());
+  told.remainder->require(among(1), {});
+  BOOST_TEST(sizes(told.remainder->known()) == whole);
+  const GoldLattice lattice = all.kept.lattice(grid, 4);
+  for (std::int64_t brick = 0; brick < bricks.size(); ++brick)
+    BOOST_TEST(told.remainder->of(brick, lattice) == all.remainder->of(brick, lattice));
+}
+
 BOOST_AUTO_TEST_CASE(differences_of_no_number_make_no_bound) {
   ProjectionSet noise = testing::noise_scan(9, 5, 17, 2);
   attacks::Chain chain(noise);

@@ -215,10 +215,9 @@ void BrickRemainder::for_each_slot(const Block& block, Visit&& visit) const {
   const Index3 &f = block.first, &n = block.bricks;
   for (std::int64_t z = 0; z < n[2]; ++z)
     for (std::int64_t y = 0; y < n[1]; ++y)
-      for (std::int64_t x = 0; x < n[0]; ++x) visit(slot({f[0] + x, f[1] + y, f[2] + z}));
+      for (std::int64_t x = 0; x < n[0]; ++x) visit(slot({f[0] + x, f[1] + y, f[2] + z}), Index3{x, y, z});
 }
 
-// Blocks that hold a brick nobody has looked at, whole.
 std::vector<BrickRemainder::Block> BrickRemainder::open(const std::vector<std::uint8_t>& selected) const {
   const Bricks bricks(grid_, granularity_);
   std::vector<std::uint8_t> wanted(maxima_.size(), 0);
@@ -231,31 +230,53 @@ std::vector<BrickRemainder::Block> BrickRemainder::open(const std::vector<std::u
   }
   std::vector<Block> out;
   for_each_block([&](const Block& block) {
-    bool open = false;
-    for_each_slot(block, [&](std::size_t i) { open = open || (wanted[i] && !looked_at_[i]); });
-    if (open) out.push_back(block);
+    // As much of it as holds them: a sample of the bricks can lie in all blocks and fill none.
+    Index3 low = block.bricks, high{};
+    for_each_slot(block, [&](std::size_t i, const Index3& p) {
+      if (!wanted[i] || looked_at_[i]) return;
+      for (std::size_t a = 0; a < 3; ++a) {
+        low[a] = std::min(low[a], p[a]);
+        high[a] = std::max(high[a], p[a] + 1);
+      }
+    });
+    if (high[0] == 0) return;
+    Block part;
+    for (std::size_t a = 0; a < 3; ++a) {
+      part.first[a] = block.first[a] + low[a];
+      part.bricks[a] = high[a] - low[a];
+    }
+    out.push_back(part);
   });
   return out;
 }
 
+// Whole blocks, and the bricks of others.
 std::vector<BrickRemainder::Block> BrickRemainder::known() const {
   std::vector<Block> out;
   for_each_block([&](const Block& block) {
-    if (looked_at_[slot(block.first)]) out.push_back(block);
+    std::vector<Block> bricks;
+    for_each_slot(block, [&](std::size_t i, const Index3& p) {
+      if (looked_at_[i])
+        bricks.push_back({{block.first[0] + p[0], block.first[1] + p[1], block.first[2] + p[2]}, {1, 1, 1}});
+    });
+    if (std::ssize(bricks) == block.bricks[0] * block.bricks[1] * block.bricks[2]) out.push_back(block);
+    else out.insert(out.end(), bricks.begin(), bricks.end());
   });
   return out;
 }
 
 std::vector<float> BrickRemainder::found(const Block& block) const {
   std::vector<float> out;
-  for_each_slot(block, [&](std::size_t i) { out.insert(out.end(), maxima_[i].begin(), maxima_[i].end()); });
+  for_each_slot(block, [&](std::size_t i, const Index3&) {
+    out.insert(out.end(), maxima_[i].begin(), maxima_[i].end());
+  });
   return out;
 }
 
 void BrickRemainder::take(const Block& block, std::span<const float> found) {
   const auto bricks = at(block.bricks[0] * block.bricks[1] * block.bricks[2]);
   if (found.size() != 6 * bricks) throw std::logic_error("BrickRemainder: not six numbers a brick");
-  for_each_slot(block, [&](std::size_t i) {
+  for_each_slot(block, [&](std::size_t i, const Index3&) {
     std::copy_n(found.begin(), 6, maxima_[i].begin());
     found = found.subspan(6);
     looked_at_[i] = 1;
