@@ -1,5 +1,5 @@
 // One work-item carries VDVR_LANES heights: the vector type VEC, INT of its comparisons, INDEX of its lanes,
-// TO_INT and TO_VEC, aligned loads and stores LOAD and STORE, others READ and WRITE, the LARGEST of its
+// TO_INT and TO_VEC, the same bits as BITS and OF_BITS, aligned loads and stores LOAD and STORE, others READ and WRITE, the LARGEST of its
 // lanes, LANE(v, n), one of them, and FOR_LANES(M), M(n) of each, n a hexadecimal digit. Where a work-group
 // shares a column or a brick, VDVR_ALONG work-items of it lie along z (device/shared_column.h). Tuning;
 // neither changes the result. With VDVR_DOUBLE 1 also a vector of sums in double precision, made of samples
@@ -16,6 +16,8 @@
 #define LANE(v, n) (v)
 #define TO_INT(v) convert_int(v)
 #define TO_VEC(v) convert_float(v)
+#define BITS(v) as_int(v)
+#define OF_BITS(v) as_float(v)
 #define LOAD(p) (*(p))
 #define STORE(v, p) (*(p) = (v))
 #define READ(p) (*(p))
@@ -29,6 +31,8 @@
 #define LANE(v, n) (v).s##n
 #define TO_INT(v) convert_int4(v)
 #define TO_VEC(v) convert_float4(v)
+#define BITS(v) as_int4(v)
+#define OF_BITS(v) as_float4(v)
 #define LOAD(p) vload4(0, p)
 #define STORE(v, p) vstore4(v, 0, p)
 #define READ(p) vload4(0, p)
@@ -42,6 +46,8 @@
 #define LANE(v, n) (v).s##n
 #define TO_INT(v) convert_int8(v)
 #define TO_VEC(v) convert_float8(v)
+#define BITS(v) as_int8(v)
+#define OF_BITS(v) as_float8(v)
 #define LOAD(p) vload8(0, p)
 #define STORE(v, p) vstore8(v, 0, p)
 #define READ(p) vload8(0, p)
@@ -55,6 +61,8 @@
 #define LANE(v, n) (v).s##n
 #define TO_INT(v) convert_int16(v)
 #define TO_VEC(v) convert_float16(v)
+#define BITS(v) as_int16(v)
+#define OF_BITS(v) as_float16(v)
 #define LOAD(p) (*(__global const float16*)(p))
 #define STORE(v, p) (*(__global float16*)(p) = (v))
 #define READ(p) vload16(0, p)

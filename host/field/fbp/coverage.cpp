@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
 
 #include "host/base/system/casts.hpp"
 #include "host/scan/geometry/view_weights.hpp"
@@ -19,6 +20,13 @@ namespace {
 
 constexpr std::int64_t sectors = 1024;
 constexpr int circles = 64;
+// Around the region its half-planes are known by sectors: up to so many of its inner radii.
+constexpr double around = 2;
+
+std::size_t sector_of(double x, double y) {
+  const double turn = std::atan2(y, x) / (2 * std::numbers::pi) + 1;
+  return static_cast<std::size_t>(turn * sectors) % sectors;
+}
 
 }  // namespace
 
@@ -157,6 +165,29 @@ void Coverage::index() {
     for (const HalfPlane& p : planes_) least = std::min(least, p.rest - r * std::hypot(p.x, p.y));
     within_.push_back(least);
   }
+  for (std::int64_t i = 0; i < sectors; ++i) {
+    first_.push_back(least_.size());
+    add_least(i);
+  }
+  first_.push_back(least_.size());
+}
+
+// Of half-planes that can have the least margin somewhere in a sector. What one has more than the nearest is
+// affine in the radius, and in the direction a cosine.
+void Coverage::add_least(std::int64_t sector) {
+  const double half = std::numbers::pi / static_cast<double>(sectors) * (1 + 1e-6),
+               phi =
+                   2 * std::numbers::pi * (static_cast<double>(sector) + 0.5) / static_cast<double>(sectors);
+  const double c = std::cos(phi), s = std::sin(phi), cos_half = std::cos(half), sin_half = std::sin(half),
+               far = around * inner_;
+  const HalfPlane& nearest = planes_[nearest_[at(sector)]];
+  // Far above what rounding can turn.
+  const double slack = 1e-9 * (std::abs(nearest.rest) + far);
+  for (const HalfPlane& p : planes_) {
+    const double x = p.x - nearest.x, y = p.y - nearest.y, middle = x * c + y * s,
+                 least = std::min(middle, middle * cos_half) - std::abs(y * c - x * s) * sin_half;
+    if (p.rest - nearest.rest + std::min(inner_ * least, far * least) <= slack) least_.push_back(p);
+  }
 }
 
 double Coverage::margin(double x, double y) const {
@@ -168,16 +199,18 @@ double Coverage::margin(double x, double y) const {
     const double part = place - static_cast<double>(i);
     return within_[i] + part * (within_[i + 1] - within_[i]) + slack_;
   }
+  const std::size_t sector = sector_of(x, y);
+  std::span<const HalfPlane> planes = planes_;
+  if (r < around * inner_)
+    planes = std::span(least_).subspan(first_[sector], first_[sector + 1] - first_[sector]);
   double margin = INFINITY;
-  for (const HalfPlane& p : planes_) margin = std::min(margin, p.margin(x, y));
+  for (const HalfPlane& p : planes) margin = std::min(margin, p.margin(x, y));
   return margin + slack_;
 }
 
 double Coverage::margin_above(double x, double y, double floor) const {
   if (std::hypot(x, y) > inner_) {
-    const double turn = std::atan2(y, x) / (2 * std::numbers::pi) + 1;
-    const std::size_t k = nearest_[static_cast<std::size_t>(turn * sectors) % sectors];
-    const double far = planes_[k].margin(x, y) + slack_;
+    const double far = planes_[nearest_[sector_of(x, y)]].margin(x, y) + slack_;
     if (far < floor) return far;
   }
   return margin(x, y);

@@ -30,7 +30,7 @@ class Coverage {
   /// Distance-like margin across z: >= 0 inside; outside, minus a lower bound of the distance to the region.
   [[nodiscard]] double margin(double x, double y) const;
   /// The same where it is at least `floor`; where not, something below `floor`. Cost: far outside, that of
-  /// one view, where margin() looks at all.
+  /// one view, where margin() looks at a few, and two radii from the axis at all.
   [[nodiscard]] double margin_above(double x, double y, double floor) const;
   /// Corners, one after another, of a convex polygon that holds every point of margin() >= -`reach`, and
   /// little more.
@@ -48,10 +48,13 @@ class Coverage {
     [[nodiscard]] double margin(double px, double py) const { return x * px + y * py + rest; }
   };
   void index();
+  void add_least(std::int64_t sector);
   void take_cylinder(const std::vector<std::array<double, 4>>& planes);
 
   std::vector<HalfPlane> planes_;
   std::vector<std::size_t> nearest_;  // by sectors of directions: the half-plane that ends there first
+  std::vector<HalfPlane> least_;      // by sectors, around the region: those that can have the least margin
+  std::vector<std::size_t> first_;    // of a sector's, and where the last ends
   std::vector<double> within_;        // of circles around the axis, the least margin on each
   std::pair<double, double> heights_;
   double inner_ = 0, slack_ = 0, slack_z_ = 0;
