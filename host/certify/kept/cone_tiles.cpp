@@ -120,25 +120,45 @@ void ConeTiles::look_at_views(const Coverage& coverage) {
   const Vec3 half{0.5 * static_cast<double>(blocks.across) * lattice_.spacing[0],
                   0.5 * static_cast<double>(blocks.across) * lattice_.spacing[1],
                   0.5 * static_cast<double>(blocks.groups * heights) * lattice_.spacing[2]};
-  double beyond_u = 0, beyond_v = 0;
-  for (const Corners& part : RegionOutline(coverage, lattice_.claimed).parts(lattice_.claimed_z)) {
-    double sum = 0;
+  struct Seen {
+    double beyond_u = 0, beyond_v = 0, row_step = 0, reach = 0, weight = 0, sum = 0;
+    std::optional<std::size_t> too_close{};  // a view
+  };
+  const std::vector<Corners> parts = RegionOutline(coverage, lattice_.claimed).parts(lattice_.claimed_z);
+  std::vector<Seen> of_parts(parts.size());
+  parallel_for(static_cast<std::int64_t>(parts.size()), {}, "", [&](std::int64_t i) {
+    Seen& out = of_parts[at(i)];
     for (std::size_t k = 0; k < scan_.views.size(); ++k) {
-      const ViewBox seen = view_box(scan_.views[k], part);
-      if (!(seen.lambda_min > 0)) throw source_too_close(k);
-      for (const Vec3& corner : part) {
+      const ViewBox seen = view_box(scan_.views[k], parts[at(i)]);
+      if (!(seen.lambda_min > 0)) {
+        out.too_close = k;
+        return;
+      }
+      for (const Vec3& corner : parts[at(i)]) {
         const Vec3 place = projected(scan_.views[k], corner);
-        beyond_u = std::max({beyond_u, -0.5 - place[0], place[0] - static_cast<double>(g.columns) + 0.5});
-        beyond_v = std::max({beyond_v, -0.5 - place[1], place[1] - static_cast<double>(g.rows) + 0.5});
+        out.beyond_u =
+            std::max({out.beyond_u, -0.5 - place[0], place[0] - static_cast<double>(g.columns) + 0.5});
+        out.beyond_v =
+            std::max({out.beyond_v, -0.5 - place[1], place[1] - static_cast<double>(g.rows) + 0.5});
       }
       const double weight = 1 / (seen.lambda_min * seen.lambda_min);
       const auto [places_u, places_v] = places_from_middle(seen, half);
-      row_step_ = std::max(row_step_, density * lattice_.spacing[2] * seen.along_v[2] / seen.lambda_min);
-      block_reach_ = std::max({block_reach_, places_u, places_v});
-      largest_weight_ = std::max(largest_weight_, weight);
-      sum += weight * sups_.by_view[k].value;
+      out.row_step =
+          std::max(out.row_step, density * lattice_.spacing[2] * seen.along_v[2] / seen.lambda_min);
+      out.reach = std::max({out.reach, places_u, places_v});
+      out.weight = std::max(out.weight, weight);
+      out.sum += weight * sups_.by_view[k].value;
     }
-    sup_ = std::max(sup_, sum * (1 + 1e-12));
+  });
+  double beyond_u = 0, beyond_v = 0;
+  for (const Seen& seen : of_parts) {
+    if (seen.too_close) throw source_too_close(*seen.too_close);
+    beyond_u = std::max(beyond_u, seen.beyond_u);
+    beyond_v = std::max(beyond_v, seen.beyond_v);
+    row_step_ = std::max(row_step_, seen.row_step);
+    block_reach_ = std::max(block_reach_, seen.reach);
+    largest_weight_ = std::max(largest_weight_, seen.weight);
+    sup_ = std::max(sup_, seen.sum * (1 + 1e-12));
   }
   for (std::size_t axis = 0; axis < 3; ++axis) look_at_axis(axis, coverage);
   columns_ = upsampled_columns(g.columns, density, std::ceil(beyond_u) + 1);
@@ -151,18 +171,20 @@ void ConeTiles::look_at_axis(std::size_t axis, const Coverage& coverage) {
   const double spacing = lattice_.spacing[axis];
   const std::pair heights{lattice_.claimed_z.first + lattice_.less_z,
                           lattice_.claimed_z.second - lattice_.less_z};
-  for (const Corners& part : RegionOutline(coverage, lattice_.claimed - lattice_.less[axis]).parts(heights)) {
-    std::vector<ViewAtPart> at_part;
+  const std::vector<Corners> parts =
+      RegionOutline(coverage, lattice_.claimed - lattice_.less[axis]).parts(heights);
+  at_parts_[axis].resize(parts.size());
+  parallel_for(static_cast<std::int64_t>(parts.size()), {}, "", [&](std::int64_t i) {
     for (std::size_t k = 0; k < scan_.views.size(); ++k) {
-      const ViewBox seen = view_box(scan_.views[k], part);
+      const ViewBox seen = view_box(scan_.views[k], parts[at(i)]);
       const double of_v = scan_.geometry.rows > 1 ? seen.along_v[axis] : 0.0;
-      at_part.push_back({sups_.by_view[k].value / (seen.lambda_min * seen.lambda_min),
-                         pi * spacing * (seen.along_u[axis] + of_v) / seen.lambda_min,
-                         spacing * seen.growth[axis] / seen.lambda_min});
-      band_[axis] = std::max(band_[axis], at_part.back().band);
+      at_parts_[axis][at(i)].push_back({sups_.by_view[k].value / (seen.lambda_min * seen.lambda_min),
+                                        pi * spacing * (seen.along_u[axis] + of_v) / seen.lambda_min,
+                                        spacing * seen.growth[axis] / seen.lambda_min});
     }
-    at_parts_[axis].push_back(std::move(at_part));
-  }
+  });
+  for (const auto& part : at_parts_[axis])
+    for (const ViewAtPart& view : part) band_[axis] = std::max(band_[axis], view.band);
 }
 
 // --- tables ---
@@ -343,12 +365,19 @@ std::vector<double> ConeTiles::bands_seen(std::size_t axis) const {
   return out;
 }
 
-const ProjectiveError& ConeTiles::error_of(std::size_t axis, const GoldFilter& filter) {
-  // By its weights: the best filter is asked for again by those who keep it.
+// By its weights: the best filter is asked for again by those who keep it.
+ConeTiles::Known& ConeTiles::known(std::size_t axis, const GoldFilter& filter) {
   const std::tuple key{axis == 2, filter.rate, filter.weights};
-  if (const auto known = filters_.find(key); known != filters_.end()) return known->second;
-  ProjectiveError error(filter, highest(axis), bands_seen(axis), most_moments);
-  return filters_.emplace(key, std::move(error)).first->second;
+  if (const auto found = filters_.find(key); found != filters_.end()) return found->second;
+  Known now{{filter, highest(axis), bands_seen(axis), most_moments}, {}};
+  return filters_.emplace(key, std::move(now)).first->second;
+}
+
+double ConeTiles::largest(std::size_t axis, const GoldFilter& filter) {
+  Known& of_filter = known(axis, filter);
+  std::optional<double>& found = of_filter.largest[axis];
+  if (!found) found = largest(axis, of_filter.error, false);
+  return *found;
 }
 
 // The largest sum over the views of what a filter errs along an axis.
@@ -366,9 +395,8 @@ ConeTiles::BestFilter ConeTiles::best_filter(int phases, std::size_t axis, int t
   BestFilter best{std::nullopt, HUGE_VAL};
   if (highest(axis) > highest_gold_band) return best;
   if (phases == 1) return {design_gold_filter(1, highest(axis), taps), 0};
-  const auto along = [&](const ProjectiveError& error, bool of_parallel) {
-    return axis == 2 ? largest(2, error, of_parallel)
-                     : std::max(largest(0, error, of_parallel), largest(1, error, of_parallel));
+  const auto along = [&](const auto& of_axis) {
+    return axis == 2 ? of_axis(2) : std::max(of_axis(0), of_axis(1));
   };
   // What they err at least, as of views that do not grow, orders them: it takes a tenth of the whole.
   struct Proposal {
@@ -379,18 +407,19 @@ ConeTiles::BestFilter ConeTiles::best_filter(int phases, std::size_t axis, int t
       return std::tie(least, number) < std::tie(other.least, other.number);
     }
   };
-  std::vector<Proposal> proposals;
+  constexpr std::array shares{0.8, 0.85, 0.9, 0.95, 1.0};
+  std::vector<Proposal> proposals(shares.size());
   const std::vector<double> bands = bands_seen(axis);
-  for (const double share : {0.8, 0.85, 0.9, 0.95, 1.0}) {
-    GoldFilter filter = design_gold_filter(phases, share * highest(axis), taps);
+  parallel_for(std::ssize(shares), {}, "", [&](std::int64_t i) {
+    GoldFilter filter = design_gold_filter(phases, shares[at(i)] * highest(axis), taps);
     const ProjectiveError of_parallel(filter, highest(axis), bands, 1);
-    const double least = along(of_parallel, true);
-    proposals.push_back({least, proposals.size(), std::move(filter)});
-  }
+    const double least = along([&](std::size_t a) { return largest(a, of_parallel, true); });
+    proposals[at(i)] = {least, at(i), std::move(filter)};
+  });
   std::ranges::sort(proposals, std::less<>{});
   for (Proposal& proposal : proposals) {
     if (proposal.least > best.error) break;
-    const double errs = along(error_of(axis, proposal.filter), false);
+    const double errs = along([&](std::size_t a) { return largest(a, proposal.filter); });
     if (!(errs < best.error)) continue;
     best = {std::move(proposal.filter), errs};
   }
@@ -399,8 +428,7 @@ ConeTiles::BestFilter ConeTiles::best_filter(int phases, std::size_t axis, int t
 
 // I_x I_y I_z - 1 = (I_x - 1) + I_x (I_y - 1) + I_x I_y (I_z - 1).
 double ConeTiles::filter_error(const GoldFilter& x, const GoldFilter& y, const GoldFilter& z) {
-  return largest(0, error_of(0, x)) +
-         x.norm * (largest(1, error_of(1, y)) + y.norm * largest(2, error_of(2, z)));
+  return largest(0, x) + x.norm * (largest(1, y) + y.norm * largest(2, z));
 }
 
 }  // namespace vdvr

@@ -114,10 +114,16 @@ class ConeTiles {
     return std::max(least, axis == 2 ? band_[2] : std::max(band_[0], band_[1]));
   }
   /// `of_parallel`: as if no view grew along the axis, at most what they err.
-  [[nodiscard]] double largest(std::size_t axis, const ProjectiveError& error,
-                               bool of_parallel = false) const;
+  [[nodiscard]] double largest(std::size_t axis, const ProjectiveError& error, bool of_parallel) const;
+  /// The same of a filter, found once.
+  double largest(std::size_t axis, const GoldFilter& filter);
   [[nodiscard]] std::vector<double> bands_seen(std::size_t axis) const;
-  const ProjectiveError& error_of(std::size_t axis, const GoldFilter& filter);
+  // What is known of a filter: by axis the largest sum over the views of what it errs.
+  struct Known {
+    ProjectiveError error;
+    std::array<std::optional<double>, 3> largest;
+  };
+  Known& known(std::size_t axis, const GoldFilter& filter);
 
   opencl::State& state_;
   const FilteredScan& scan_;
@@ -133,8 +139,8 @@ class ConeTiles {
   double table_seconds_ = 0;
   double row_step_ = 0;     // rows of the table from a node to the one above it
   double block_reach_ = 0;  // columns or rows of the table from a block's middle to its nodes
-  std::array<std::vector<std::vector<ViewAtPart>>, 3> at_parts_;  // where filters along the axis fill
-  std::map<std::tuple<bool, int, std::vector<float>>, ProjectiveError> filters_;  // along z, rate, weights
+  std::array<std::vector<std::vector<ViewAtPart>>, 3> at_parts_;        // where filters along the axis fill
+  std::map<std::tuple<bool, int, std::vector<float>>, Known> filters_;  // along z, rate, weights
 };
 
 }  // namespace vdvr
