@@ -137,7 +137,7 @@ void check_rates(const RateOptions& rates) {
 }
 
 Trial try_rates(opencl::State& state, GoldRates& gold, const Volume& base, double epsilon,
-                const std::vector<std::uint8_t>& looked_at) {
+                std::span<const float> by_brick, const std::vector<std::uint8_t>& looked_at) {
   GoldStream& stream = gold.fine();
   const GoldSettings& settings = stream.settings();
   Trial t;
@@ -151,7 +151,10 @@ Trial try_rates(opencl::State& state, GoldRates& gold, const Volume& base, doubl
       selected,
       [&](GoldStream::Batch& batch) {
         for (const BrickMeasure& m : batch.measure(field, static_cast<float>(epsilon), device_selected))
-          if (m.total >= 0) t.slack = std::max(t.slack, static_cast<double>(m.slack));
+          if (m.total >= 0)
+            t.slack =
+                std::max(t.slack, static_cast<double>(m.slack) /
+                                      (by_brick.empty() ? 1.0 : static_cast<double>(by_brick[at(m.brick)])));
       },
       {}, "trial");
   t.gold = std::max(0.0, t.slack - t.projection);

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "host/certify/crew/gold_rates.hpp"
@@ -33,9 +34,11 @@ void check_rates(const RateOptions& rates);
 /// for, four.
 std::vector<Rates> candidates(const RateOptions& wanted, bool cone);
 
-/// Measures `base` on a few blocks of gold, around bricks that are looked at.
+/// Measures `base` on a few blocks of gold, around bricks that are looked at. `by_brick`: bricks' tolerances
+/// in units of `epsilon`; where there are some, the slack is the largest in a brick over what it has of
+/// these.
 Trial try_rates(opencl::State& state, GoldRates& gold, const Volume& base, double epsilon,
-                const std::vector<std::uint8_t>& looked_at);
+                std::span<const float> by_brick, const std::vector<std::uint8_t>& looked_at);
 void add_trial_bounds(std::vector<Bound>& bounds, const Rates& rates, const Trial& trial);
 
 /// What rates are chosen for.

@@ -111,6 +111,7 @@ PlanInSigma make_plan_in_sigma(Device& device, const ProjectionSet& scan, double
                   scan, field, grid, granularity);
   CertifyOptions whole = options;
   whole.plan.estimate = false;
+  whole.plan.by_brick = refinement_in_sigma(out.sigma, multiple).by_brick;
   out.plan = make_plan(device, scan, Tolerance{{}, asked_of_brick(multiple, out.sigma.range.least)}, whole,
                        progress);
   if (const auto forecast = forecast_in_sigma(out.plan, out.sigma, std::array{multiple}); !forecast.empty())

@@ -175,6 +175,7 @@ class Planner {
                 plan_.settings.comparison.epsilon_of_max
                     ? largest_of_gold(state_, prepared_->filtered, prepared_->sups, plan_.grid, all.front())
                     : 0);
+    take_tolerances();
     sample_columns();
     report(progress_, "plan", 0.3);
     // They are made of derivatives along the axes of parallel beam.
@@ -269,6 +270,20 @@ class Planner {
     plan_.reference_range = range.high - range.low;
   }
 
+  // In units of the plan's own, the smallest.
+  void take_tolerances() {
+    by_brick_ = std::exchange(plan_.settings.by_brick, {});
+    const std::int64_t bricks = Bricks(plan_.grid, plan_.layout.granularity).size();
+    const auto smallest = static_cast<float>(to_world(plan_.epsilon_abs, units_));
+    if (!by_brick_.empty() && std::ssize(by_brick_) != bricks)
+      throw InputError(fmt::format("`by_brick` has {} tolerances for {} bricks", by_brick_.size(), bricks));
+    for (float& one : by_brick_) {
+      if (!(one >= smallest * (1 - 0x1p-20f)))
+        throw InputError(fmt::format("a tolerance of {} of a brick lies below the plan's {}", one, smallest));
+      one /= smallest;
+    }
+  }
+
   [[nodiscard]] bool is_cone() const { return !prepared_->filtered.views.empty(); }
   [[nodiscard]] bool estimates_base() const {
     return is_cone() && plan_.settings.estimate && plan_.settings.forecast;
@@ -284,7 +299,7 @@ class Planner {
 
   Trial try_out(const Rates& r) {
     GoldRates gold(state_, prepared_->filtered, prepared_->sups, settings_at(r), source_at(r));
-    const Trial t = try_rates(state_, gold, plan_.base, plan_.epsilon_abs, look(gold));
+    const Trial t = try_rates(state_, gold, plan_.base, plan_.epsilon_abs, by_brick_, look(gold));
     add_trial_bounds(plan_.bounds, r, t);
     return t;
   }
@@ -377,6 +392,7 @@ class Planner {
   std::optional<Coverage> coverage_;
   std::uint64_t scan_bytes_ = 0;  // as read
   double preparation_ = 0;        // seconds that build will take again
+  std::vector<float> by_brick_;
   std::vector<std::uint8_t> looked_at_;
   std::optional<SampledColumns> sampled_;  // of estimates of cone beam
   bool estimates_views_ = false;

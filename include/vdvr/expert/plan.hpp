@@ -49,6 +49,9 @@ struct PlanSettings {
   /// What is foreseen is for this tolerance, no smaller than the plan's: where bricks begin that pictures
   /// then refine. None: the plan's.
   std::optional<Tolerance> everywhere{};
+  /// What bricks [z][y][x] may err by, as densities, where they have tolerances of their own, of which the
+  /// plan's is the smallest: rates are chosen for these. A plan that is made holds none.
+  std::vector<float> by_brick{};
 };
 
 struct PreparedScan;
