@@ -164,7 +164,7 @@ class Peer:
         return p
 
     def look(self, azimuth):
-        """docs/rendering.md: azimuth 0 looks along -y with +x to the right, view-up -z; zoom 1."""
+        """docs/rendering.md: azimuth 0 looks along -y with +x to the right, view-up -z; zoom 1 of the grid."""
         b = self.image.GetBounds()
         middle = [(b[2 * a] + b[2 * a + 1]) / 2 for a in range(3)]
         radius = math.dist(b[0::2], b[1::2]) / 2
@@ -226,7 +226,7 @@ def our_side(o, volume):
 
 def our_picture(o, volume, transfer, azimuth, shaded, folder):
     path = os.path.join(folder, f"vdvr-{azimuth:g}{'' if shaded else '-unshaded'}.png")
-    run_vdvr([o.vdvr, "render", *our_side(o, volume), "-o", path, "--force", "--tf", transfer, "--azimuth",
+    run_vdvr([o.vdvr, "render", *our_side(o, volume), "-o", path, "--force", "--tf", transfer, "--frame", "grid", "--azimuth",
               f"{azimuth}", "--elevation", f"{o.elevation}", "--size", f"{o.pixels}x{o.pixels}", "--device", o.device,
               "--quiet"] + ([] if shaded else ["--no-shading"]))
     reader = vtk.vtkPNGReader()
