@@ -1,9 +1,9 @@
 // One work-item carries VDVR_LANES heights: the vector type VEC, INT of its comparisons, INDEX of its lanes,
-// TO_INT and TO_VEC, the same bits as BITS and OF_BITS, aligned loads and stores LOAD and STORE, others READ and WRITE, the LARGEST of its
-// lanes, LANE(v, n), one of them, and FOR_LANES(M), M(n) of each, n a hexadecimal digit. Where a work-group
-// shares a column or a brick, VDVR_ALONG work-items of it lie along z (device/shared_column.h). Tuning;
-// neither changes the result. With VDVR_DOUBLE 1 also a vector of sums in double precision, made of samples
-// by WIDE and rounded to samples by NARROW; without it sums are as samples.
+// TO_INT and TO_VEC, the same bits as BITS and OF_BITS, aligned loads and stores LOAD and STORE, others READ
+// and WRITE, the LARGEST of its lanes, LANE(v, n), one of them, and FOR_LANES(M), M(n) of each, n a
+// hexadecimal digit. Where a work-group shares a column or a brick, VDVR_ALONG work-items of it lie along z
+// (device/shared_column.h). Tuning; neither changes the result. With VDVR_DOUBLE 1 also a vector of sums in
+// double precision, made of samples by WIDE and rounded to samples by NARROW; without it sums are as samples.
 #ifndef VDVR_LANES
 #define VDVR_LANES 16
 #endif
