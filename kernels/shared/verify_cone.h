@@ -18,6 +18,7 @@ typedef struct {
   int tiles;          // so many
   int blocks;         // of heights
   int all_heights;    // of a node
+  int used;           // of these; what lies above may hold anything finite
 } VdvrVerifyCone;
 
 #endif

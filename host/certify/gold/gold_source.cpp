@@ -12,16 +12,14 @@ double gold_reach(const GoldSettings& settings) {
 }
 
 double reach_of_all(GoldSettings settings) {
-  double reach = gold_reach(settings);
   // A base of more than four cells of the detector's pitch holds nothing.
-  for (std::uint8_t log = 1; log <= 2; ++log) {
-    bool divides = true;
-    for (const std::int64_t cells : settings.grid.cells) divides = divides && cells % (1 << log) == 0;
-    if (!divides) break;
-    settings.coarsening = {log, log, log};
-    reach = std::max(reach, gold_reach(settings));
+  constexpr std::uint8_t coarsest = 2;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const std::int64_t cells = settings.grid.cells[a];
+    std::uint8_t& of_axis = settings.coarsening[2 - a];  // along z, y, x
+    while (of_axis < coarsest && cells % (std::int64_t{2} << of_axis) == 0) ++of_axis;
   }
-  return reach;
+  return gold_reach(settings);
 }
 
 GoldSource::GoldSource(opencl::State& state, const FilteredScan& scan, const FieldSups& sups,

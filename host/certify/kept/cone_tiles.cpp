@@ -29,7 +29,7 @@ using std::numbers::pi;
 constexpr int density = 8;
 // Rows from which on tables are made by transforms along v.
 constexpr std::int64_t fewest_rows = 16;
-constexpr std::uint64_t most_table_bytes = std::uint64_t{256} << 20,
+constexpr std::uint64_t most_table_bytes = std::uint64_t{512} << 20,
                         most_view_bytes = std::uint64_t{16} << 20;
 constexpr std::int64_t side = VDVR_CONE_TILE, heights = VDVR_CONE_HEIGHTS;
 
@@ -200,7 +200,8 @@ std::int64_t ConeTiles::views_together() const {
         fmt::format("a view of {} x {} pixels, eight times finer both ways, needs {:.1f} MiB; "
                     "raise `max_memory`",
                     scan_.geometry.columns, scan_.geometry.rows, static_cast<double>(each) / 0x1p20));
-  return std::clamp<std::int64_t>(static_cast<std::int64_t>(share / each), 1,
+  const auto fit = static_cast<std::int64_t>(share / each);
+  return std::clamp<std::int64_t>(fit > VDVR_CONE_VIEWS ? fit / VDVR_CONE_VIEWS * VDVR_CONE_VIEWS : fit, 1,
                                   std::min(most_views, scan_.geometry.views()));
 }
 

@@ -196,7 +196,7 @@ void add_nodes(NodeSums& out, const ViewOnBox& v, const Sups& sups, const ConePa
 void add_kinds(FieldBounds& b, const NodeSums& S, const ConePath& p) {
   constexpr double weights = 1.4883 * 1.4883;  // sums of magnitudes of the points' weights, both ways
   const double roundings =
-                   56 + 10 * p.nodes.cancellation + static_cast<double>(p.nodes.together + p.nodes.calls),
+                   38 + 10 * p.nodes.cancellation + static_cast<double>(p.nodes.together + p.nodes.calls),
                node = S.places + S.between + weights * 1.01 * half_ulp * roundings * S.value +
                       weights * S.weight * p.host_rounding;
   const LagrangeFilter across = lagrange_filter(p.path.across), along = lagrange_filter(p.path.along);

@@ -21,7 +21,7 @@
 
 namespace vdvr {
 
-static_assert(sizeof(VdvrVerifyCone) == 32);
+static_assert(sizeof(VdvrVerifyCone) == 36);
 
 namespace {
 
@@ -278,7 +278,8 @@ struct Place {
 
 // (n0 + sum_e n_e d_e) / (l0 + sum_e l_e d_e) less its value m in the middle is sum_e (n_e - m l_e) d_e over
 // lambda. Numerator: five roundings of each term. Lambda: five, of terms `cancellation` as large as itself;
-// its reciprocal 2.5 units in the last place, the product one. Then the sum with what is left of the middle.
+// its reciprocal 2.5 units in the last place, the product one. Then the sum with what is left of the middle,
+// and half of a place less.
 Place place_of(const ViewMatrix& m, std::size_t axis, const Vec3& seen, const Vec3& spacing,
                double lambda_min, double cancellation, std::int64_t first, double density) {
   Place out;
@@ -291,7 +292,7 @@ Place place_of(const ViewMatrix& m, std::size_t axis, const Vec3& seen, const Ve
   const double middle = table_place(axis, seen[axis], density), whole = std::floor(middle - reach) - 1;
   out.numbers.s[3] = static_cast<float>(middle - whole);
   out.whole = to_int(static_cast<std::int64_t>(whole) - first);
-  out.error = 1.01 * half_ulp * (reach * (14 + 5 * cancellation) + 4);
+  out.error = 1.01 * half_ulp * (reach * (14 + 5 * cancellation) + 5);
   return out;
 }
 
@@ -365,7 +366,8 @@ void VerifyConeNodes::back_project(const Nodes& wanted, const Tiles& tiles, cons
                                .first_tile = to_int(first),
                                .tiles = to_int(n),
                                .blocks = to_int(blocks),
-                               .all_heights = to_int(wanted.heights)};
+                               .all_heights = to_int(wanted.heights),
+                               .used = to_int(wanted.used)};
     // Eight rows from each of a block's places on; places may round to the row beside. A device whose
     // work-items have no caches of their own gains nothing.
     const bool strips = upright_ && lanes == VDVR_VERIFY_CONE_HEIGHTS &&

@@ -16,15 +16,22 @@ typedef struct {
   int4 whole;
 } View;
 
-// The eight weights on the nodes -3 .. 4: one factor of each of seven rotations of the nodes.
+// The eight weights on the nodes -3 .. 4, expanded about the middle between 0 and 1: even and odd powers of
+// g = f - 1/2, alike and opposite on either side.
+#define EVEN(a, b, c, d) (float8)(a, b, c, d, d, c, b, a)
+#define ODD(a, b, c, d) (float8)(a, b, c, d, -(d), -(c), -(b), -(a))
 static inline ALWAYS_INLINE float8 lagrange(float f) {
-  const float8 a = (f - (float8)(-2, -1, 0, 1, 2, 3, 4, -3)) * (f - (float8)(-1, 0, 1, 2, 3, 4, -3, -2)),
-               b = (f - (float8)(0, 1, 2, 3, 4, -3, -2, -1)) * (f - (float8)(1, 2, 3, 4, -3, -2, -1, 0)),
-               c = (f - (float8)(2, 3, 4, -3, -2, -1, 0, 1)) * (f - (float8)(3, 4, -3, -2, -1, 0, 1, 2)),
-               d = (f - (float8)(4, -3, -2, -1, 0, 1, 2, 3)) * (float8)(-1.0f / 5040, 1.0f / 720, -1.0f / 240,
-                                                                        1.0f / 144, -1.0f / 144, 1.0f / 240,
-                                                                        -1.0f / 720, 1.0f / 5040);
-  return (a * b) * (c * d);
+  const float g = f - 0.5f;
+  const float8 s = (float8)(g * g);
+  float8 even = EVEN(1.0f / 1440, -1.0f / 288, 1.0f / 160, -1.0f / 288),
+         odd = ODD(-1.0f / 5040, 1.0f / 720, -1.0f / 240, 1.0f / 144);
+  even = fma(s, even, EVEN(-7.0f / 1152, 59.0f / 1152, -15.0f / 128, 83.0f / 1152));
+  odd = fma(s, odd, ODD(1.0f / 576, -59.0f / 2880, 5.0f / 64, -83.0f / 576));
+  even = fma(s, even, EVEN(259.0f / 23040, -499.0f / 4608, 1299.0f / 2560, -1891.0f / 4608));
+  odd = fma(s, odd, ODD(-37.0f / 11520, 499.0f / 11520, -433.0f / 1280, 1891.0f / 2304));
+  even = fma(s, even, EVEN(-5.0f / 2048, 49.0f / 2048, -245.0f / 2048, 1225.0f / 2048));
+  odd = fma(s, odd, ODD(5.0f / 7168, -49.0f / 5120, 245.0f / 3072, -1225.0f / 1024));
+  return fma((float8)(g), odd, even);
 }
 
 static inline ALWAYS_INLINE float sum_of(float8 v) {
@@ -142,7 +149,7 @@ __kernel void verify_cone(__global float* nodes, __global const float* table, __
   const int last_column = s.columns - 8, last_row = s.rows - 8;
   const size_t plane_size = (size_t)s.columns * (size_t)s.rows;
   const float dy = (float)y - 0.5f * (float)(VDVR_VERIFY_TILE - 1);
-  const int slot = slots[s.first_tile + tile];
+  const int slot = slots[s.first_tile + tile], more = block * VDVR_VERIFY_CONE_BLOCK + 8 < s.used;
   __global const View* own = numbers + ((size_t)tile * s.blocks + block) * s.views;
   float8 sums[VDVR_VERIFY_TILE * VDVR_VERIFY_CONE_BLOCK];
   for (int i = 0; i < VDVR_VERIFY_TILE * VDVR_VERIFY_CONE_BLOCK; ++i) sums[i] = (float8)(0.0f);
@@ -157,7 +164,7 @@ __kernel void verify_cone(__global float* nodes, __global const float* table, __
                 last_row);
       float8* of = sums + x * VDVR_VERIFY_CONE_BLOCK;
       add_views(of, seen, together, 0);
-      add_views(of + 8, seen, together, 8);
+      if (more) add_views(of + 8, seen, together, 8);
     }
   }
   for (int x = range.x; x <= range.y; ++x) {
