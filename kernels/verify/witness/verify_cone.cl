@@ -4,6 +4,7 @@
 // nodes[slot][y][x][all_heights]; int slots[tile]; uchar wanted[tile][block]; uchar4 ranges[tile] = first and
 // last x, then y. What reads like kept/cone_nodes.cl is written a second time: a fault in a shared line would
 // be in what is certified and in what it is held to. Called by host/verify/witness/cone_nodes.cpp.
+#include "device/eight_points.h"
 #include "device/lanes.h"
 #include "shared/verify_cone.h"
 #include "shared/verify_nodes.h"
@@ -15,24 +16,6 @@ typedef struct {
   float4 u, v, lambda;
   int4 whole;
 } View;
-
-// The eight weights on the nodes -3 .. 4, expanded about the middle between 0 and 1: even and odd powers of
-// g = f - 1/2, alike and opposite on either side.
-#define EVEN(a, b, c, d) (float8)(a, b, c, d, d, c, b, a)
-#define ODD(a, b, c, d) (float8)(a, b, c, d, -(d), -(c), -(b), -(a))
-static inline ALWAYS_INLINE float8 lagrange(float f) {
-  const float g = f - 0.5f;
-  const float8 s = (float8)(g * g);
-  float8 even = EVEN(1.0f / 1440, -1.0f / 288, 1.0f / 160, -1.0f / 288),
-         odd = ODD(-1.0f / 5040, 1.0f / 720, -1.0f / 240, 1.0f / 144);
-  even = fma(s, even, EVEN(-7.0f / 1152, 59.0f / 1152, -15.0f / 128, 83.0f / 1152));
-  odd = fma(s, odd, ODD(1.0f / 576, -59.0f / 2880, 5.0f / 64, -83.0f / 576));
-  even = fma(s, even, EVEN(259.0f / 23040, -499.0f / 4608, 1299.0f / 2560, -1891.0f / 4608));
-  odd = fma(s, odd, ODD(-37.0f / 11520, 499.0f / 11520, -433.0f / 1280, 1891.0f / 2304));
-  even = fma(s, even, EVEN(-5.0f / 2048, 49.0f / 2048, -245.0f / 2048, 1225.0f / 2048));
-  odd = fma(s, odd, ODD(5.0f / 7168, -49.0f / 5120, 245.0f / 3072, -1225.0f / 1024));
-  return fma((float8)(g), odd, even);
-}
 
 static inline ALWAYS_INLINE float sum_of(float8 v) {
   const float4 four = v.lo + v.hi;
