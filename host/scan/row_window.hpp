@@ -14,8 +14,9 @@ struct RowWindow {
   std::int64_t first = 0, rows = 0;  ///< of the detector
 };
 
-/// The rows of the detector around the grid's middle that hold about `most_samples`; nothing where all rows
-/// do, or where the grid has no cell between them. Copies those rows.
+/// Neighbouring rows of the detector that hold about `most_samples` and in which, of those that the grid
+/// covers, as much goes on as in all of them; nothing where all rows are few enough, or where the grid has no
+/// cell between them. Copies those rows. Cost: a look at twelve views.
 std::optional<RowWindow> row_window(const ProjectionSet& scan, const Grid& grid, std::int64_t most_samples);
 
 }  // namespace vdvr
