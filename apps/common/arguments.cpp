@@ -17,18 +17,6 @@ namespace po = boost::program_options;
 namespace vdvr::cli {
 namespace {
 
-std::vector<std::string> split(const std::string& text, char separator) {
-  std::vector<std::string> parts(1);
-  for (const char c : text) {
-    if (c == separator) {
-      parts.emplace_back();
-    } else {
-      parts.back() += c;
-    }
-  }
-  return parts;
-}
-
 std::int64_t parse_integer(const std::string& what, const std::string& text) {
   std::int64_t result = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), result);
@@ -40,6 +28,18 @@ std::int64_t parse_integer(const std::string& what, const std::string& text) {
 std::string option(const std::string& name) { return "--" + name; }
 
 }  // namespace
+
+std::vector<std::string> split(const std::string& text, char separator) {
+  std::vector<std::string> parts(1);
+  for (const char c : text) {
+    if (c == separator) {
+      parts.emplace_back();
+    } else {
+      parts.back() += c;
+    }
+  }
+  return parts;
+}
 
 double parse_number(const std::string& what, const std::string& text) {
   const std::size_t plus = !text.empty() && text[0] == '+' ? 1 : 0;  // from_chars takes no plus sign

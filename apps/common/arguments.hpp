@@ -99,6 +99,8 @@ class Arguments {
 
 /// "2G" and the like: K, M, G, T are powers of 1024. Throws InputError.
 std::uint64_t parse_bytes(const std::string& option, const std::string& text);
+/// What lies between the separators; of an empty text one empty part.
+std::vector<std::string> split(const std::string& text, char separator);
 /// A whole text as a finite number; throws InputError naming `what`.
 double parse_number(const std::string& what, const std::string& text);
 /// Three numbers separated by commas; throws InputError naming `what`.

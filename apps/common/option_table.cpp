@@ -40,14 +40,7 @@ OptionTable option_table(const Command& command, const std::string& case_word) {
 }
 
 Operand operand_of(const std::string& shape) {
-  std::vector<std::string> parts(1);
-  for (const char c : shape) {
-    if (c == '|') {
-      parts.emplace_back();
-    } else {
-      parts.back() += c;
-    }
-  }
+  const std::vector<std::string> parts = split(shape, '|');
   Operand operand;
   const bool numbers = parts.size() > 1 && std::all_of(parts.begin(), parts.end(), is_whole);
   for (const auto& part : parts) {

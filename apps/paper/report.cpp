@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "vdvr/error.hpp"
 #include "vdvr/expert/output_file.hpp"
 #include "vdvr/expert/stop.hpp"
 

@@ -4,7 +4,6 @@
 
 #include "apps/common/volume_json.hpp"
 #include "apps/paper/report.hpp"
-#include "vdvr/automatic_view.hpp"
 
 namespace vdvr::paper {
 

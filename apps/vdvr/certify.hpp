@@ -11,8 +11,6 @@
 #include "apps/vdvr/options.hpp"
 #include "vdvr/certify_scan.hpp"
 #include "vdvr/expert/certify.hpp"
-#include "vdvr/expert/noise_forecast.hpp"
-#include "vdvr/expert/picture_refinement.hpp"
 #include "vdvr/expert/progress.hpp"
 #include "vdvr/expert/projections.hpp"
 #include "vdvr/expert/understood.hpp"

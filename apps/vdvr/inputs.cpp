@@ -116,6 +116,12 @@ InputKind kind_of(const fs::path& path, const Arguments& args) {
   return InputKind::scan;
 }
 
+void require_certified(const fs::path& path, const Arguments& args) {
+  if (kind_of(path, args) != InputKind::certified)
+    throw InputError(
+        fmt::format("{}: is not a certified volume; `vdvr build` makes one of a scan", path.string()));
+}
+
 namespace {
 
 // Warnings go to the terminal whatever is printed there beside them.

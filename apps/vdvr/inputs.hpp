@@ -13,7 +13,6 @@
 #include "vdvr/expert/progress.hpp"
 #include "vdvr/expert/projections.hpp"
 #include "vdvr/expert/understood.hpp"
-#include "vdvr/read_scan.hpp"
 #include "vdvr/vdvr_file.hpp"
 
 namespace vdvr::cli {
@@ -35,6 +34,8 @@ enum class InputKind { certified, volume, scan };
 
 /// Throws FileError when there is nothing, or an empty file.
 InputKind kind_of(const std::filesystem::path& path, const Arguments& args);
+/// Throws InputError where it is no certified volume.
+void require_certified(const std::filesystem::path& path, const Arguments& args);
 
 /// A scan, checked for what reconstruction assumes; the notes of the check join the report's. `field.center`
 /// overrides. `understood` is filled unless it is null.

@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-
 #include "apps/vdvr/inputs.hpp"
 
 namespace vdvr::cli {

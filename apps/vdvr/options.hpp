@@ -5,7 +5,6 @@
 
 #include "apps/common/common_options.hpp"
 #include "vdvr/expert/build.hpp"
-#include "vdvr/expert/certificate.hpp"
 #include "vdvr/expert/plan.hpp"
 #include "vdvr/expert/reconstruct.hpp"
 #include "vdvr/vdvr_file.hpp"

@@ -3,9 +3,7 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
 #include <nlohmann/json_fwd.hpp>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,9 +14,7 @@
 #include "vdvr/expert/certificate.hpp"
 #include "vdvr/expert/grid.hpp"
 #include "vdvr/expert/mixed_volume.hpp"
-#include "vdvr/expert/plan.hpp"
 #include "vdvr/expert/projections.hpp"
-#include "vdvr/vdvr_file.hpp"
 
 namespace vdvr::cli {
 

@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "apps/common/common_options.hpp"
 #include "apps/vdvr/report_measured.hpp"
 #include "vdvr/expert/certificate.hpp"
 #include "vdvr/expert/error_slice.hpp"

@@ -8,7 +8,6 @@
 #include "apps/vdvr/measure_tables.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/measure_picture.hpp"
-#include "vdvr/expert/output_file.hpp"
 
 namespace vdvr::cli {
 namespace {

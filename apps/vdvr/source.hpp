@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "apps/vdvr/inputs.hpp"
-#include "vdvr/expert/certify_picture.hpp"
 #include "vdvr/expert/d2vr.hpp"
 #include "vdvr/expert/drawn_volume.hpp"
 #include "vdvr/expert/error_slice.hpp"

@@ -9,7 +9,6 @@
 #include "apps/vdvr/inputs.hpp"
 #include "vdvr/certified_picture.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/expert/stop.hpp"
 
 namespace vdvr::cli {
 namespace {

@@ -20,7 +20,6 @@
 #include "host/certify/gold/gold_batch.hpp"
 #include "host/certify/plan_parts.hpp"
 #include "host/certify/sampler_share.hpp"
-#include "host/field/fbp/reconstruct.hpp"
 #include "host/volume/bricks.hpp"
 #include "host/volume/result_units.hpp"
 #include "vdvr/error.hpp"

@@ -2,12 +2,10 @@
 // (docs/error-bounds.md, section 14).
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "host/base/opencl/host_memory.hpp"

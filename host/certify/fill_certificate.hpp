@@ -9,7 +9,6 @@
 
 #include "host/certify/classify_bricks.hpp"
 #include "host/certify/crew/journalled_gold.hpp"
-#include "host/certify/gold/prepared_scan.hpp"
 #include "vdvr/expert/build.hpp"
 
 namespace vdvr {

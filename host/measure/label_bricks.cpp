@@ -1,7 +1,5 @@
 #include "host/measure/label_bricks.hpp"
 
-#include <cmath>
-
 #include "host/base/system/casts.hpp"
 #include "host/volume/brick_layout.hpp"
 

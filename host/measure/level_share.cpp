@@ -86,10 +86,6 @@ AffineForm affine_of(const Corners& v) {
   return form;
 }
 
-double share_of_plane(double middle, const Vec3& slope, double t) {
-  return share_sorted(middle, sorted(slope).slope, t);
-}
-
 Interval share_above(const AffineForm& f, double t) {
   if (f.least >= t) return {1, 1};
   if (f.largest < t) return {0, 0};

@@ -24,9 +24,6 @@ struct AffineForm {
 /// Of a trilinear function; with what double precision may have lost of its corners.
 AffineForm affine_of(const Corners& corners);
 
-/// The share of the box where the affine function is at least t; -t for t is that where it is below.
-double share_of_plane(double middle, const Vec3& slope, double t);
-
 /// The share of the box where the function is at least t, rounded outward. 0 or 1 exactly where it is below
 /// or above everywhere. An infinite t is allowed.
 Interval share_above(const AffineForm& form, double t);

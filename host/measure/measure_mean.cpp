@@ -3,7 +3,6 @@
 #include "host/measure/measure_mean.hpp"
 
 #include <cmath>
-#include <limits>
 
 #include "vdvr/error.hpp"
 

@@ -1,7 +1,5 @@
 #include "vdvr/expert/decorate.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>

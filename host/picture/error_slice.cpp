@@ -23,25 +23,12 @@ constexpr Colour kDark{24, 24, 24}, kLight{230, 230, 230}, kNotCompared{64, 64, 
 constexpr Colour kAbove{0, 255, 255};  // above the tolerance: a hue that the map does not have
 constexpr std::int64_t kMargin = 8, kBar = 10;
 
-/// Dark to light with rising luminance, so that it reads in print too; from 0 to epsilon.
-constexpr std::array<std::array<double, 3>, 5> kStops{
-    {{0, 0, 8}, {80, 18, 120}, {190, 55, 85}, {248, 142, 10}, {252, 255, 165}}};
-
-Colour error_colour(double e) {
-  const double x = std::clamp(e, 0.0, 1.0) * 4;
-  const auto i = std::min<std::size_t>(3, static_cast<std::size_t>(x));
-  const double t = x - static_cast<double>(i);
-  Colour c{};
-  for (std::size_t k = 0; k < 3; ++k)
-    c[k] = static_cast<std::uint8_t>(std::lround((1 - t) * kStops[i][k] + t * kStops[i + 1][k]));
-  return c;
-}
-
+/// From 0 to epsilon.
 std::vector<TransferPoint> error_colours(double epsilon) {
   std::vector<TransferPoint> points;
-  for (std::size_t i = 0; i < kStops.size(); ++i)
+  for (std::size_t i = 0; i < kErrorStops.size(); ++i)
     points.push_back({epsilon * static_cast<double>(i) / 4,
-                      {kStops[i][0] / 255, kStops[i][1] / 255, kStops[i][2] / 255},
+                      {kErrorStops[i][0] / 255, kErrorStops[i][1] / 255, kErrorStops[i][2] / 255},
                       1});
   return points;
 }
@@ -129,7 +116,7 @@ void draw_caption(Image& image, const std::string& high, const std::string& line
   draw_text(image, static_cast<double>(right + kMargin), above, high, small, kLight);
   for (std::int64_t x = left; x < right; ++x)
     fill(image, x, top, 1, kBar,
-         error_colour(static_cast<double>(x - left) / static_cast<double>(right - left - 1)));
+         between_stops(kErrorStops, static_cast<double>(x - left) / static_cast<double>(right - left - 1)));
   const auto room = static_cast<double>(image.width - 2 * kMargin);
   const double size = std::clamp(text_size(image), small, 15.0);
   draw_text(image, kMargin, above + kBar + 7,
@@ -197,7 +184,7 @@ void compare(ErrorSlice& result, const PixelGrid& pixels, const Axes& axes, cons
       result.max_error = error;
     }
     const bool within = error <= c.epsilon_abs;
-    put(result.image, x, y, within ? error_colour(error / c.epsilon_abs) : kAbove);
+    put(result.image, x, y, within ? between_stops(kErrorStops, error / c.epsilon_abs) : kAbove);
   });
 }
 
@@ -246,7 +233,7 @@ float largest_of(const std::vector<float>& values) {
 Colour value_colour(float value, double end) {
   if (!std::isfinite(value)) return kNotCompared;
   const auto v = static_cast<double>(value);
-  return v <= end ? error_colour(end > 0 ? v / end : 0) : kAbove;
+  return v <= end ? between_stops(kErrorStops, end > 0 ? v / end : 0) : kAbove;
 }
 
 std::string end_text(BrickQuantity quantity, double end) {

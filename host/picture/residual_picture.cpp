@@ -10,7 +10,6 @@
 #include "host/picture/canvas.hpp"
 #include "host/picture/sheet.hpp"
 #include "host/picture/text.hpp"
-#include "host/picture/ticks.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {

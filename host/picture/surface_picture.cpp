@@ -5,10 +5,10 @@
 #include <cmath>
 #include <limits>
 
+#include "host/picture/canvas.hpp"
+
 namespace vdvr {
 namespace {
-
-using Colour = std::array<std::uint8_t, 3>;
 
 constexpr std::uint8_t possible = 1, sure = 2;
 constexpr Colour kNone{24, 24, 28}, kSure{225, 222, 205}, kStripe{235, 110, 20}, kBetween{70, 40, 20};
@@ -28,13 +28,7 @@ Colour viridis(double fraction) {
                                                                {92, 200, 99},
                                                                {170, 220, 50},
                                                                {253, 231, 37}}};
-  const double x = std::clamp(fraction, 0.0, 1.0) * (stops.size() - 1);
-  const auto i = std::min<std::size_t>(stops.size() - 2, static_cast<std::size_t>(x));
-  const double t = x - static_cast<double>(i);
-  Colour c{};
-  for (std::size_t k = 0; k < 3; ++k)
-    c[k] = static_cast<std::uint8_t>(std::lround((1 - t) * stops[i][k] + t * stops[i + 1][k]));
-  return c;
+  return between_stops(stops, fraction);
 }
 
 // Of stripes that run to the upper right.

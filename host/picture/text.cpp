@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <sstream>
 
+#include "host/files/io/text_encoding.hpp"
 #include "host/picture/embedded_font.hpp"
 #include "vdvr/error.hpp"
 
@@ -41,24 +42,9 @@ float scale_of(double size) { return stbtt_ScaleForMappingEmToPixels(&font(), st
 /// Code points; U+FFFD for each byte that is not part of a whole, shortest form.
 std::vector<int> code_points(std::string_view text) {
   std::vector<int> points;
-  for (std::size_t i = 0; i < text.size();) {
-    const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(text[k]); };
-    const unsigned char first = byte(i);
-    const std::size_t length = first < 0x80         ? 1
-                               : first >> 5 == 0x06 ? 2
-                               : first >> 4 == 0x0e ? 3
-                               : first >> 3 == 0x1e ? 4
-                                                    : 0;
-    int point = length <= 1 ? first : first & (0x7f >> length);
-    bool whole = length > 0 && i + length <= text.size();
-    for (std::size_t k = 1; whole && k < length; ++k) {
-      whole = byte(i + k) >> 6 == 2;
-      point = point << 6 | (byte(i + k) & 0x3f);
-    }
-    constexpr std::array<int, 5> least{0, 0, 0x80, 0x800, 0x10000};
-    whole = whole && point >= least[length] && point < 0x110000 && point >> 11 != 0x1b;
-    points.push_back(!whole ? 0xfffd : point < 0x20 ? ' ' : point);
-    i += whole ? length : 1;
+  while (!text.empty()) {
+    const auto point = static_cast<int>(next_code_point(text).value_or(0xfffd));
+    points.push_back(point < 0x20 ? ' ' : point);
   }
   return points;
 }

@@ -12,7 +12,6 @@
 #include <string>
 #include <vector>
 
-#include "host/scan/preprocess.hpp"
 #include "host/scan/raw/raw_scan.hpp"
 #include "vdvr/expert/preparation_steps.hpp"
 

@@ -8,7 +8,6 @@
 #include <array>
 #include <span>
 #include <utility>
-#include <vector>
 
 #include "vdvr/expert/grid.hpp"
 #include "vdvr/expert/projections.hpp"

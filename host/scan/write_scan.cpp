@@ -21,7 +21,6 @@ namespace vdvr {
 namespace {
 
 namespace fs = std::filesystem;
-using io::hdf5::Shape;
 
 constexpr const char* kData = "/exchange/data";
 // One chunk per view, cut into rows where a chunk would pass HDF5's 4 GiB.

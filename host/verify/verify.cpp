@@ -5,9 +5,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
-#include <map>
-#include <random>
 #include <utility>
 
 #include "host/base/opencl/host_memory.hpp"
@@ -22,11 +19,9 @@
 #include "host/verify/verify_points.hpp"
 #include "host/verify/worst_sample.hpp"
 #include "host/volume/sampler/sampler_terms.hpp"
-#include "vdvr/error.hpp"
 #include "vdvr/expert/certified_region.hpp"
 #include "vdvr/expert/exact_field.hpp"
 #include "vdvr/expert/reconstruct.hpp"
-#include "vdvr/expert/region_of_interest.hpp"
 #include "vdvr/expert/trust.hpp"
 
 namespace vdvr {

@@ -8,7 +8,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "host/base/opencl/array.hpp"
 #include "host/base/system/casts.hpp"
 #include "host/verify/verify_field.hpp"
 

@@ -1,8 +1,6 @@
 // The certified volume on the host: sampling by the shared header, and storage figures.
 #include "vdvr/expert/mixed_volume.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 

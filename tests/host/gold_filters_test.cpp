@@ -41,6 +41,14 @@ double interpolant(const GoldFilter& filter, int place, const Of& node) {
   return sum;
 }
 
+// At least the error of the wave kappa, of its amplitude, at any phase; |kappa| <= filter.band.
+double gold_filter_error(const GoldFilter& filter, double kappa) {
+  double largest = 0;
+  for (int phase = 1; 2 * phase <= filter.rate; ++phase)
+    largest = std::max(largest, symbol_error(functional(filter, phase), kappa));
+  return largest;
+}
+
 // What rounding in double precision may add to the errors that are computed here.
 double noise(const GoldFilter& filter) { return tolerance::fp64_sum(8 * filter.taps, 1 + filter.norm); }
 

@@ -40,7 +40,7 @@ BOOST_AUTO_TEST_CASE(truncated_tiff_is_refused_or_whole_at_every_length) {
     const std::string whole = support::bytes_of(folder / "a.tif");
     for (std::size_t length = 0; length < whole.size(); ++length) {
       const Path cut = folder.file("cut.tif", whole.substr(0, length));
-      BOOST_REQUIRE_THROW(static_cast<void>(io::read_tiff(cut)), FileError);
+      BOOST_REQUIRE_THROW(static_cast<void>(read_tiff(cut)), FileError);
     }
   }
 }
@@ -49,10 +49,10 @@ BOOST_AUTO_TEST_CASE(tiff_that_is_no_single_grey_image_is_refused) {
   const TemporaryFolder folder;
   write_tiff(folder / "rgb.tif", 2, 2, std::vector<std::uint8_t>(12), SAMPLEFORMAT_UINT, false,
              COMPRESSION_NONE, 3);
-  BOOST_CHECK_THROW(static_cast<void>(io::read_tiff(folder / "rgb.tif")), FileError);
-  BOOST_CHECK_THROW(static_cast<void>(io::read_tiff(folder.file("text.tif", "not a picture"))), FileError);
-  BOOST_CHECK_THROW(static_cast<void>(io::read_tiff(folder.path())), FileError);
-  BOOST_CHECK_THROW(static_cast<void>(io::read_tiff(folder / "missing.tif")), FileError);
+  BOOST_CHECK_THROW(static_cast<void>(read_tiff(folder / "rgb.tif")), FileError);
+  BOOST_CHECK_THROW(static_cast<void>(read_tiff(folder.file("text.tif", "not a picture"))), FileError);
+  BOOST_CHECK_THROW(static_cast<void>(read_tiff(folder.path())), FileError);
+  BOOST_CHECK_THROW(static_cast<void>(read_tiff(folder / "missing.tif")), FileError);
 }
 
 BOOST_AUTO_TEST_CASE(folder_is_read_in_natural_order) {

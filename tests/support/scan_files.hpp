@@ -181,6 +181,21 @@ void write_tiff(const Path& path, int rows, int columns, const std::vector<T>& s
   TIFFClose(t);
 }
 
+struct TiffImage {
+  std::int64_t rows = 0, columns = 0;
+  std::vector<double> samples;  // [row][column]
+};
+
+// Of a file of one image.
+inline TiffImage read_tiff(const Path& path) {
+  io::TiffFile file(path);
+  BOOST_REQUIRE(file.stack().images == 1);
+  TiffImage image{file.stack().rows, file.stack().columns, {}};
+  image.samples.resize(static_cast<std::size_t>(image.rows * image.columns));
+  file.read(0, image.samples.data());
+  return image;
+}
+
 template <typename T>
 void check_tiff(const Path& path, int format, bool tiled, int compression) {
   std::vector<T> samples(19 * 37);
@@ -189,7 +204,7 @@ void check_tiff(const Path& path, int format, bool tiled, int compression) {
   samples[3] = std::numeric_limits<T>::max();
   samples[4] = std::numeric_limits<T>::lowest();
   write_tiff(path, 19, 37, samples, format, tiled, compression);
-  const io::TiffImage image = io::read_tiff(path);
+  const TiffImage image = read_tiff(path);
   BOOST_TEST(image.rows == 19);
   BOOST_TEST(image.columns == 37);
   BOOST_REQUIRE(image.samples.size() == samples.size());

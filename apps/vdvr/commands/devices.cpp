@@ -6,7 +6,6 @@
 
 #include "apps/vdvr/command.hpp"
 #include "apps/vdvr/doctor.hpp"
-#include "apps/vdvr/options.hpp"
 #include "apps/vdvr/output.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/trust.hpp"

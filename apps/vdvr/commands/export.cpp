@@ -104,9 +104,7 @@ int export_command(Arguments& args) {
   const ExportOptions options = options_of(args, common, format);
   check_volume_output(output, format, common.force, {path});
   if (args.has("sigma")) check_volume_output(sigma_path(output), format, common.force, {path});
-  if (kind_of(path, args) != InputKind::certified)
-    throw InputError(
-        fmt::format("{}: is not a certified volume; `vdvr build` makes one of a scan", path.string()));
+  require_certified(path, args);
 
   ProgressLine progress(args.who(), common.quiet);
   const VdvrFile file = open_certified(path, args, args.has("unverified"));

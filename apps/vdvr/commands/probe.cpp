@@ -13,7 +13,6 @@
 #include "vdvr/expert/certified_points.hpp"
 #include "vdvr/expert/certify.hpp"
 #include "vdvr/expert/d2vr.hpp"
-#include "vdvr/expert/error_slice.hpp"
 #include "vdvr/expert/exact_field.hpp"
 #include "vdvr/expert/output_file.hpp"
 

@@ -149,9 +149,7 @@ int residual_command(Arguments& args) {
   const Outputs outputs = outputs_of(args, common.force, {projections, path});
   const ResidualOptions options = rows_option(args);
   if (outputs.picture.empty()) refuse(args, {"picture-row"}, "is for the picture, which --picture asks for");
-  if (kind_of(path, args) != InputKind::certified)
-    throw InputError(
-        fmt::format("{}: is not a certified volume; `vdvr build` makes one of a scan", path.string()));
+  require_certified(path, args);
 
   ProgressLine progress(args.who(), common.quiet);
   const VdvrFile file = open_certified(path, args);

@@ -68,9 +68,7 @@ int verify_command(Arguments& args) {
   }
   refuse(args, {"rays"}, "goes with --picture");
   const auto path = args.path("FILE"), projections = args.path("projections");
-  if (kind_of(path, args) != InputKind::certified)
-    throw InputError(
-        fmt::format("{}: is not a certified volume; `vdvr build` makes one of a scan", path.string()));
+  require_certified(path, args);
 
   ProgressLine progress(args.who(), common.quiet);
   const VdvrFile file = read_to_verify(path, common.max_memory);

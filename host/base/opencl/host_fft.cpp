@@ -4,16 +4,8 @@
 #include <numbers>
 
 namespace vdvr::fft {
-namespace {
 
 using Complex = std::complex<double>;
-
-// std::complex's own product looks for NaN.
-Complex product(Complex a, Complex b) {
-  return {a.real() * b.real() - a.imag() * b.imag(), a.real() * b.imag() + a.imag() * b.real()};
-}
-
-}  // namespace
 
 HostFft::HostFft(std::int64_t length) : length_(length) {
   for (std::int64_t j = 0; j < length / 2; ++j) {

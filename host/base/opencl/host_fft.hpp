@@ -9,6 +9,11 @@
 
 namespace vdvr::fft {
 
+/// std::complex's own product looks for NaN.
+inline std::complex<double> product(std::complex<double> a, std::complex<double> b) {
+  return {a.real() * b.real() - a.imag() * b.imag(), a.real() * b.imag() + a.imag() * b.real()};
+}
+
 class HostFft {
  public:
   /// `length`: a power of two.

@@ -22,7 +22,6 @@
 #include "host/certify/bounds/six_taps.hpp"
 #include "host/field/fdk/region_parts.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/expert/error_map.hpp"
 
 namespace vdvr {
 namespace {
@@ -270,34 +269,26 @@ FieldSups field_sups(opencl::State& state, Upsampler& upsampler, const FilteredS
   const ParallelGeometry& g = scan.geometry;
   const DenseGrid grid(scan);
   constexpr int dense = DenseGrid::density;
-  const UpsampledColumns &columns = grid.columns, own = upsampled_columns(g.columns, 1, 0);
+  const UpsampledColumns& columns = grid.columns;
   const std::vector<double>& rows = grid.rows;
-  std::vector<double> own_rows;
-  for (std::int64_t j = 0; j < g.rows; ++j) own_rows.push_back(static_cast<double>(j));
-  const double rise = grid.rise;
 
   FieldSups sups;
-  const auto sups_of = [&](const UpsampledColumns& c, const std::vector<double>& r, int order_u, int order_v,
-                           int lattice, std::int64_t first, std::int64_t n) {
+  const auto sups_of = [&](int order_u, int order_v, std::int64_t first, std::int64_t n) {
     double sum = 0;
-    for (const double m :
-         view_sups(state, upsampler(c, r, order_u, order_v, lattice, first, n), std::max(order_u, order_v)))
+    for (const double m : view_sups(state, upsampler(columns, rows, order_u, order_v, dense, first, n),
+                                    std::max(order_u, order_v)))
       sum += m;
-    return sum;
+    return grid.rise * sum;
   };
   const std::int64_t chunk = view_chunk(state, scan, columns.count, static_cast<std::int64_t>(rows.size()));
   for_views(g.views(), chunk, step, [&](std::int64_t first, std::int64_t n) {
-    sups.value += rise * sups_of(columns, rows, 0, 0, dense, first, n);
-    sups.second_u += rise * sups_of(columns, rows, 2, 0, dense, first, n);
-    sups.sampled_second_u += sups_of(own, own_rows, 2, 0, 1, first, n);
+    sups.value += sups_of(0, 0, first, n);
+    sups.second_u += sups_of(2, 0, first, n);
     if (g.rows == 1) return;  // a single row does not vary along v
-    sups.second_v += rise * sups_of(columns, rows, 0, 2, dense, first, n);
-    sups.sampled_second_v += sups_of(own, own_rows, 0, 2, 1, first, n);
+    sups.second_v += sups_of(0, 2, first, n);
   });
   const double share = share_of_views(g.views(), step);
-  for (double* sum :
-       {&sups.value, &sups.second_u, &sups.second_v, &sups.sampled_second_u, &sups.sampled_second_v})
-    *sum *= share;
+  for (double* sum : {&sups.value, &sups.second_u, &sups.second_v}) *sum *= share;
   // Rounding of the evaluation, relative to the sums of magnitudes it adds up.
   double samples = 0;
   for (const double m : scan.view_max) samples += m;

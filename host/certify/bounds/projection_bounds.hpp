@@ -2,7 +2,6 @@
 // (docs/error-bounds.md).
 #pragma once
 
-#include <string>
 #include <vector>
 
 #include "host/field/fbp/back_project.hpp"
@@ -18,9 +17,6 @@ struct FieldSups {
   double value = 0;     ///< sum over views of sup |q|
   double second_u = 0;  ///< of sup |q_uu|
   double second_v = 0;  ///< of sup |q_vv|
-  double sampled_second_u =
-      0;  ///< of the largest |q_uu| at the detector's own samples: what the paper's Eq. 7 takes
-  double sampled_second_v = 0;
   /// Of cone beam view by view; none of parallel beam. The sums above are then the largest of lambda^-2 times
   /// these on the covered region, with lengths as at the axis.
   std::vector<DetectorSups> by_view;

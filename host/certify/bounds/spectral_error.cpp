@@ -40,11 +40,6 @@ AmplitudeSum amplitude_sum(Device& device, const std::vector<float>& spectrum, c
   constexpr std::int64_t slab_entries = std::int64_t{4} << 20;
   const std::int64_t plane = size[0] * size[1],
                      slab = std::clamp<std::int64_t>(slab_entries / plane, 1, size[2]);
-  std::array<std::vector<double>, 3> along;
-  for (std::size_t a = 0; a < 3; ++a)
-    for (std::int64_t m = 0; m < size[a]; ++m)
-      along[a].push_back(centre_error(
-          std::array{std::numbers::pi * static_cast<double>(m) / static_cast<double>(size[a]) / rate}));
   AmplitudeSum sum;
   sum.rate = rate;
   for (std::int64_t first = 0; first < size[2]; first += slab) {
@@ -54,18 +49,13 @@ AmplitudeSum amplitude_sum(Device& device, const std::vector<float>& spectrum, c
     z.count = planes;
     const ErrorMap map = error_map(device, {cosine_axis(size[0]), cosine_axis(size[1]), z}, rate);
     std::size_t i = 0, at = static_cast<std::size_t>(first * plane);
-    for (std::int64_t mz = first; mz < first + planes; ++mz)
-      for (std::int64_t my = 0; my < size[1]; ++my) {
-        const double yz = along[1][static_cast<std::size_t>(my)] + along[2][static_cast<std::size_t>(mz)];
-        for (std::int64_t mx = 0; mx < size[0]; ++mx, ++i, ++at) {
-          const double a = static_cast<double>(std::abs(spectrum[at]));
-          const double term = a * static_cast<double>(map.bound[i]);
-          sum.centre += a * static_cast<double>(map.centre[i]);
-          sum.bound += term;
-          sum.sum_over_axes += a * std::min(2.0, along[0][static_cast<std::size_t>(mx)] + yz);
-          sum.largest_term = std::max(sum.largest_term, term);
-        }
-      }
+    for (const std::size_t end = at + static_cast<std::size_t>(planes * plane); at < end; ++i, ++at) {
+      const double a = static_cast<double>(std::abs(spectrum[at]));
+      const double term = a * static_cast<double>(map.bound[i]);
+      sum.centre += a * static_cast<double>(map.centre[i]);
+      sum.bound += term;
+      sum.largest_term = std::max(sum.largest_term, term);
+    }
   }
   return sum;
 }

@@ -5,8 +5,6 @@
 #include <array>
 #include <cstdint>
 #include <functional>
-#include <optional>
-#include <utility>
 #include <vector>
 
 #include "host/base/system/bytes.hpp"

@@ -1,7 +1,5 @@
 #include "host/certify/crew/crew_messages.hpp"
 
-#include <utility>
-
 #include "host/base/system/casts.hpp"
 namespace vdvr {
 namespace {

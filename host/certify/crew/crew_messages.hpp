@@ -2,9 +2,7 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "host/certify/crew/crew.hpp"
@@ -74,9 +72,7 @@ void members(auto& way, Of<FilteredScan> auto& s) {
 void members(auto& way, Of<DetectorSups> auto& s) {
   way(s.value, s.second_u, s.second_v, s.fourth_u, s.second_uv, s.fourth_v);
 }
-void members(auto& way, Of<FieldSups> auto& s) {
-  way(s.value, s.second_u, s.second_v, s.sampled_second_u, s.sampled_second_v, s.by_view);
-}
+void members(auto& way, Of<FieldSups> auto& s) { way(s.value, s.second_u, s.second_v, s.by_view); }
 /// By what devices are told apart, and what is charged for their texture units.
 void members(auto& way, Of<DeviceInfo> auto& d) {
   way(d.platform, d.name, d.vendor, d.version, d.driver, d.is_gpu, d.is_cpu, d.subnormals, d.images,

@@ -2,7 +2,6 @@
 // and not computed again.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <functional>
 #include <map>

@@ -1,8 +1,6 @@
 // Streams gold. Calls kept_gold.cpp and node_slack.cpp.
 #include "host/certify/gold/gold_stream.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -16,7 +14,6 @@
 #include "host/certify/gold/gold_blocks.hpp"
 #include "host/field/fbp/reconstruct.hpp"
 #include "host/volume/bricks.hpp"
-#include "vdvr/error.hpp"
 
 namespace vdvr {
 namespace {

@@ -6,10 +6,8 @@
 // is the same.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <functional>
-#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -18,12 +16,10 @@
 
 #include "host/base/opencl/kernel.hpp"
 #include "host/certify/bounds/projection_bounds.hpp"
-#include "host/certify/gold/fit_coefficients.hpp"
 #include "host/certify/gold/gold_settings.hpp"
 #include "host/certify/gold/gold_source.hpp"
 #include "host/certify/gold/node_slack.hpp"
 #include "host/certify/gold/search_triples.hpp"
-#include "host/field/fbp/back_project.hpp"
 #include "host/field/fbp/coverage.hpp"
 #include "host/volume/sampler/device_field.hpp"
 #include "shared/gold_shape.h"

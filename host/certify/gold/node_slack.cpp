@@ -7,7 +7,6 @@
 #include "host/base/opencl/write_later.hpp"
 #include "host/base/system/casts.hpp"
 #include "host/base/system/outward.hpp"
-#include "host/field/fbp/back_project.hpp"
 #include "host/volume/bricks.hpp"
 
 namespace vdvr {

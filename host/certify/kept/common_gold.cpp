@@ -2,6 +2,7 @@
 #include "host/certify/kept/common_gold.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <stdexcept>
 #include <thread>

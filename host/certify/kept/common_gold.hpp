@@ -2,13 +2,11 @@
 // share memory. Whoever dies or hangs is not waited for: what he took, others make again.
 #pragma once
 
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <span>
-#include <string>
 #include <utility>
 #include <vector>
 

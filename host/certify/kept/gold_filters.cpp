@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <numbers>
 #include <span>
 
 #include "host/certify/bounds/tap_design.hpp"
@@ -93,13 +92,6 @@ GoldFilter design_gold_filter(int rate, double band, int taps) {
   filter.second_difference = difference_norm(filter, std::array{1.0, -2.0, 1.0});
   filter.fourth_difference = difference_norm(filter, std::array{1.0, -4.0, 6.0, -4.0, 1.0});
   return filter;
-}
-
-double gold_filter_error(const GoldFilter& filter, double kappa) {
-  double largest = 0;
-  for (int phase = 1; 2 * phase <= filter.rate; ++phase)
-    largest = std::max(largest, symbol_error(functional(filter, phase), kappa));
-  return largest;
 }
 
 }  // namespace vdvr

@@ -1,7 +1,6 @@
 // Filters that take gold from its nodes to a finer lattice along one axis, each with its bounds.
 #pragma once
 
-#include <cstdint>
 #include <numbers>
 #include <vector>
 
@@ -48,8 +47,5 @@ NodeFunctional functional(const GoldFilter& filter, int phase);
 /// <= 3/4 pi, and taps is even, 2 .. 32 (a single tap could not be mirrored; two are about linear
 /// interpolation). Cost: some 2 ms a phase with 16 taps, of half the phases.
 GoldFilter design_gold_filter(int rate, double band, int taps = 16);
-
-/// At least the error of the wave kappa, of its amplitude, at any phase; |kappa| <= filter.band.
-double gold_filter_error(const GoldFilter& filter, double kappa);
 
 }  // namespace vdvr

@@ -12,7 +12,6 @@
 #include "host/field/fbp/cosine_series.hpp"
 #include "host/field/fbp/reconstruct.hpp"
 #include "host/field/fdk/region_parts.hpp"
-#include "vdvr/error.hpp"
 
 namespace vdvr {
 namespace {

@@ -15,7 +15,6 @@
 #include "host/field/fbp/batched_product.hpp"
 #include "host/field/fbp/ramp_kernel.hpp"
 #include "host/scan/geometry/view_weights.hpp"
-#include "vdvr/error.hpp"
 
 namespace vdvr {
 namespace {

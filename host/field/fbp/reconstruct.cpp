@@ -5,14 +5,12 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <functional>
 #include <optional>
 
 #include "host/base/opencl/host_memory.hpp"
 #include "host/base/opencl/kernel.hpp"
-#include "host/base/system/huge_pages.hpp"
 #include "host/base/system/parallel.hpp"
 #include "host/field/fbp/back_project.hpp"
 #include "host/field/fbp/coverage.hpp"

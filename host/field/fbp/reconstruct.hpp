@@ -1,7 +1,6 @@
 // Uniform reconstruction from filtered projections, and what gold shares with it.
 #pragma once
 
-#include <string>
 #include <vector>
 
 #include "host/field/fbp/filter_projections.hpp"

@@ -1,12 +1,10 @@
 // What a reconstruction fills, and what times it.
 #pragma once
 
-#include <array>
 #include <chrono>
 #include <cstdint>
 #include <functional>
 #include <future>
-#include <span>
 #include <string>
 #include <utility>
 #include <vector>

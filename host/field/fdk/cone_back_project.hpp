@@ -4,7 +4,6 @@
 #include <array>
 #include <vector>
 
-#include "host/base/opencl/column_tuning.hpp"
 #include "host/field/fbp/filter_projections.hpp"
 #include "vdvr/expert/grid.hpp"
 

@@ -11,7 +11,6 @@
 #include "host/base/system/parallel.hpp"
 #include "host/field/fbp/ramp_kernel.hpp"
 #include "host/field/fdk/fdk_weights.hpp"
-#include "vdvr/error.hpp"
 
 namespace vdvr {
 

@@ -136,23 +136,16 @@ std::optional<ScanNoise> of_series(const std::filesystem::path& path, ScanOption
 std::optional<ScanNoise> read_scan_noise(const std::filesystem::path& path, const ScanOptions& how,
                                          const ProjectionSet& scan, const NoiseOptions& options,
                                          std::string* why, const Progress& progress) {
-  if (!scan.geometry.series.none()) {
-    try {
-      return of_series(path, how, scan, options, why, progress);
-    } catch (const ResourceError& e) {
-      // No build fails for want of it.
-      if (why) *why = e.what();
-      return std::nullopt;
-    }
-  }
-  if (scan.geometry.extension != own_detector(scan.geometry).extension)
+  const bool is_series = !scan.geometry.series.none();
+  if (!is_series && scan.geometry.extension != own_detector(scan.geometry).extension)
     return read_scan_noise(path, how, own_rows(scan), options, why, progress);
-  if (!changes_noise(scan.report.preparation)) {
+  if (!is_series && !changes_noise(scan.report.preparation)) {
     const bool stated = options.photons || options.sigma_p;
     return scan_noise(scan, options, stated ? std::nullopt : noise_of_flats(path, how, scan.geometry), why);
   }
   try {
-    return of_prepared(path, how, scan, options, why, progress);
+    return is_series ? of_series(path, how, scan, options, why, progress)
+                     : of_prepared(path, how, scan, options, why, progress);
   } catch (const ResourceError& e) {
     // No build fails for want of it.
     if (why) *why = e.what();

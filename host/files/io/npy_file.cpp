@@ -6,12 +6,12 @@
 
 #include <array>
 #include <bit>
-#include <cstring>
 #include <fstream>
 #include <string>
 #include <string_view>
 
 #include "host/base/system/limits.hpp"
+#include "host/files/io/stored_numbers.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr::io {
@@ -134,14 +134,6 @@ std::pair<std::string_view, std::size_t> header_of(const fs::path& path, std::st
   return {bytes.substr(start, length), start + length};
 }
 
-template <typename T>
-double number_at(std::string_view bytes, std::size_t i) {
-  static_assert(std::endian::native == std::endian::little);
-  T value;
-  std::memcpy(&value, bytes.data() + i * sizeof(T), sizeof(T));
-  return static_cast<double>(value);
-}
-
 // In C order what a file holds in Fortran order, whose first axis is the fastest.
 std::vector<double> in_c_order(const std::vector<double>& values, const std::vector<std::int64_t>& shape) {
   std::vector<std::size_t> stride;
@@ -191,8 +183,9 @@ NpyArray read_npy(const fs::path& path) {
     throw FileError(fmt::format("{}: {} numbers take {} bytes, {} are there", path.string(),
                                 shape_text(header.shape), needed, numbers.size()));
   NpyArray out{header.shape, std::vector<double>(needed / (wide ? 8 : 4))};
-  for (std::size_t i = 0; i < out.values.size(); ++i)
-    out.values[i] = wide ? number_at<double>(numbers, i) : number_at<float>(numbers, i);
+  static_assert(std::endian::native == std::endian::little);
+  convert_numbers(ScalarKind::floating, wide ? 8 : 4, reinterpret_cast<const unsigned char*>(numbers.data()),
+                  static_cast<std::int64_t>(out.values.size()), false, out.values.data());
   if (header.fortran) out.values = in_c_order(out.values, out.shape);
   return out;
 }

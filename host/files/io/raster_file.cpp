@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <fstream>
 #include <limits>
 #include <map>
@@ -17,6 +16,7 @@
 
 #include "host/base/system/limits.hpp"
 #include "host/base/system/lower.hpp"
+#include "host/files/io/number_text.hpp"
 #include "host/files/io/text_encoding.hpp"
 #include "vdvr/error.hpp"
 
@@ -26,11 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 using Fields = std::map<std::string, std::string>;
 
-std::string trimmed(const std::string& text) {
-  const auto first = text.find_first_not_of(" \t\r\n");
-  if (first == std::string::npos) return "";
-  return text.substr(first, text.find_last_not_of(" \t\r\n") - first + 1);
-}
+std::string trimmed(std::string_view text) { return std::string(without_blanks(text)); }
 
 // What a header may hold, parsed: the fields, and where the samples start when they follow it.
 class HeaderText {
@@ -348,36 +344,9 @@ RasterHeader read_nrrd(HeaderText& header) {
 
 // --- samples ---
 
-template <typename T>
-void convert(const unsigned char* from, std::int64_t count, bool swap, double* out) {
-  for (std::int64_t i = 0; i < count; ++i) {
-    std::array<unsigned char, sizeof(T)> bytes;
-    std::memcpy(bytes.data(), from + static_cast<std::size_t>(i) * sizeof(T), sizeof(T));
-    if (swap) std::reverse(bytes.begin(), bytes.end());
-    out[i] = static_cast<double>(std::bit_cast<T>(bytes));
-  }
-}
-
 void convert_samples(const RasterHeader& h, const unsigned char* from, std::int64_t count, double* out) {
   const bool swap = h.sample_bytes > 1 && h.big_endian != (std::endian::native == std::endian::big);
-  const bool is_signed = h.kind == ScalarKind::signed_integer;
-  if (h.kind == ScalarKind::floating)
-    return h.sample_bytes == 4 ? convert<float>(from, count, swap, out)
-                               : convert<double>(from, count, swap, out);
-  switch (h.sample_bytes) {
-    case 1:
-      return is_signed ? convert<std::int8_t>(from, count, swap, out)
-                       : convert<std::uint8_t>(from, count, swap, out);
-    case 2:
-      return is_signed ? convert<std::int16_t>(from, count, swap, out)
-                       : convert<std::uint16_t>(from, count, swap, out);
-    case 4:
-      return is_signed ? convert<std::int32_t>(from, count, swap, out)
-                       : convert<std::uint32_t>(from, count, swap, out);
-    default:
-      return is_signed ? convert<std::int64_t>(from, count, swap, out)
-                       : convert<std::uint64_t>(from, count, swap, out);
-  }
+  convert_numbers(h.kind, h.sample_bytes, from, count, swap, out);
 }
 
 // zlib and gzip wrappers alike (MetaImage writes the first, NRRD the second).

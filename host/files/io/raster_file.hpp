@@ -9,10 +9,9 @@
 #include <string>
 
 #include "host/files/io/raster_axes.hpp"
+#include "host/files/io/stored_numbers.hpp"
 
 namespace vdvr::io {
-
-enum class ScalarKind { unsigned_integer, signed_integer, floating };
 
 struct RasterHeader {
   std::filesystem::path file;                    ///< the header

@@ -28,25 +28,9 @@ void append(std::string& out, char32_t c) {
   add(0xf0 | c >> 18), add(0x80 | (c >> 12 & 0x3f)), add(0x80 | (c >> 6 & 0x3f)), add(0x80 | (c & 0x3f));
 }
 
-// Well-formed by RFC 3629: no overlong forms, no surrogates, nothing above U+10FFFF.
-bool is_utf8(const std::string& text) {
-  for (std::size_t i = 0; i < text.size();) {
-    const unsigned char c = byte(text[i]);
-    const std::size_t length = c < 0x80                ? 1
-                               : c >= 0xc2 && c < 0xe0 ? 2
-                               : c >= 0xe0 && c < 0xf0 ? 3
-                               : c >= 0xf0 && c < 0xf5 ? 4
-                                                       : 0;
-    if (length == 0 || i + length > text.size()) return false;
-    char32_t value = length == 1 ? c : c & (0x7fu >> length);
-    for (std::size_t k = 1; k < length; ++k) {
-      if ((byte(text[i + k]) & 0xc0) != 0x80) return false;
-      value = value << 6 | (byte(text[i + k]) & 0x3fu);
-    }
-    constexpr std::array<char32_t, 5> least{0, 0, 0x80, 0x800, 0x10000};
-    if (value < least[length] || (value >= 0xd800 && value < 0xe000) || value > 0x10ffff) return false;
-    i += length;
-  }
+bool is_utf8(std::string_view text) {
+  while (!text.empty())
+    if (!next_code_point(text)) return false;
   return true;
 }
 
@@ -70,6 +54,27 @@ std::string of_utf16(const std::string& text, bool big_endian) {
 }
 
 }  // namespace
+
+std::optional<char32_t> next_code_point(std::string_view& text) {
+  const std::string_view all = text;
+  const unsigned char c = byte(all[0]);
+  const std::size_t length = c < 0x80                ? 1
+                             : c >= 0xc2 && c < 0xe0 ? 2
+                             : c >= 0xe0 && c < 0xf0 ? 3
+                             : c >= 0xf0 && c < 0xf5 ? 4
+                                                     : 0;
+  text.remove_prefix(1);
+  if (length == 0 || length > all.size()) return {};
+  char32_t value = length == 1 ? c : c & (0x7fu >> length);
+  for (std::size_t k = 1; k < length; ++k) {
+    if ((byte(all[k]) & 0xc0) != 0x80) return {};
+    value = value << 6 | (byte(all[k]) & 0x3fu);
+  }
+  constexpr std::array<char32_t, 5> least{0, 0, 0x80, 0x800, 0x10000};
+  if (value < least[length] || (value >= 0xd800 && value < 0xe000) || value > 0x10ffff) return {};
+  text = all.substr(length);
+  return value;
+}
 
 std::string utf8_of(std::string text) {
   if (text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff")) return of_utf16(text, text[0] == '\xfe');

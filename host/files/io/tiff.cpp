@@ -7,7 +7,6 @@
 #include <array>
 #include <cmath>
 #include <cstdarg>
-#include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <optional>
@@ -15,6 +14,7 @@
 
 #include "host/base/system/limits.hpp"
 #include "host/files/io/number_text.hpp"
+#include "host/files/io/stored_numbers.hpp"
 #include "host/files/io/tiff_messages.hpp"
 #include "vdvr/error.hpp"
 
@@ -275,15 +275,6 @@ class TiffFile::Reader {
   // Of samples in a row: rows begin at whole bytes.
   [[nodiscard]] std::int64_t bytes_of(std::int64_t samples) const { return (samples * bits_ + 7) / 8; }
 
-  template <typename T>
-  static void convert(const unsigned char* from, std::int64_t n, double* to) {
-    for (std::int64_t i = 0; i < n; ++i) {
-      T value;
-      std::memcpy(&value, from + static_cast<std::size_t>(i) * sizeof(T), sizeof(T));
-      to[i] = static_cast<double>(value);
-    }
-  }
-
   static void convert_halves(const unsigned char* from, std::int64_t n, double* to) {
     for (std::int64_t i = 0; i < n; ++i) {
       std::uint16_t bits = 0;
@@ -306,23 +297,12 @@ class TiffFile::Reader {
   }
 
   void convert_row(const unsigned char* from, std::int64_t n, double* to) const {
-    if (format_ == SAMPLEFORMAT_IEEEFP)
-      return bits_ == 16   ? convert_halves(from, n, to)
-             : bits_ == 32 ? convert<float>(from, n, to)
-                           : convert<double>(from, n, to);
-    const bool negative = format_ == SAMPLEFORMAT_INT;
-    switch (bits_) {
-      case 8:
-        return negative ? convert<std::int8_t>(from, n, to) : convert<std::uint8_t>(from, n, to);
-      case 16:
-        return negative ? convert<std::int16_t>(from, n, to) : convert<std::uint16_t>(from, n, to);
-      case 32:
-        return negative ? convert<std::int32_t>(from, n, to) : convert<std::uint32_t>(from, n, to);
-      case 64:
-        return negative ? convert<std::int64_t>(from, n, to) : convert<std::uint64_t>(from, n, to);
-      default:
-        return unpack(from, n, to);
-    }
+    const ScalarKind kind = format_ == SAMPLEFORMAT_IEEEFP ? ScalarKind::floating
+                            : format_ == SAMPLEFORMAT_INT  ? ScalarKind::signed_integer
+                                                           : ScalarKind::unsigned_integer;
+    if (kind == ScalarKind::floating && bits_ == 16) return convert_halves(from, n, to);
+    if (bits_ % 8 != 0) return unpack(from, n, to);
+    convert_numbers(kind, bits_ / 8, from, n, false, to);
   }
 
   void read_strips(double* out) {
@@ -384,17 +364,6 @@ TiffFile::~TiffFile() = default;
 TiffFile::TiffFile(TiffFile&&) noexcept = default;
 const TiffStack& TiffFile::stack() const { return reader_->stack(); }
 void TiffFile::read(std::int64_t image, double* out) { reader_->read(image, out); }
-
-TiffImage read_tiff(const std::filesystem::path& path, std::uint64_t max_memory_bytes) {
-  TiffFile file(path, max_memory_bytes);
-  const TiffStack& s = file.stack();
-  if (s.images != 1)
-    throw FileError(fmt::format("{}: holds {} images; one is needed", path.string(), s.images));
-  TiffImage image{s.rows, s.columns, s.is_integer, {}};
-  image.samples.resize(static_cast<std::size_t>(s.rows * s.columns));
-  file.read(0, image.samples.data());
-  return image;
-}
 
 TiffSeries::TiffSeries(std::vector<std::filesystem::path> files, std::uint64_t max_memory_bytes)
     : files_(std::move(files)), limit_(max_memory_bytes) {

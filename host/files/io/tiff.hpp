@@ -11,12 +11,6 @@
 
 namespace vdvr::io {
 
-struct TiffImage {
-  std::int64_t rows = 0, columns = 0;
-  bool is_integer = false;
-  std::vector<double> samples;  ///< [row][column]
-};
-
 /// What a file says about itself.
 struct TiffStack {
   std::int64_t images = 0, rows = 0, columns = 0;
@@ -47,9 +41,6 @@ class TiffFile {
   class Reader;
   std::unique_ptr<Reader> reader_;
 };
-
-/// Of a file of one image; FileError where it has several.
-TiffImage read_tiff(const std::filesystem::path& path, std::uint64_t max_memory_bytes = 0);
 
 /// Images of several files, one after the other, as a file may have one or many; all of one size. One file is
 /// open at a time.

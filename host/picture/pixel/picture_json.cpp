@@ -61,12 +61,6 @@ Clip clip_of(const Json& j) {
   return c;
 }
 
-Json light_list(const std::vector<Vec3>& lights) {
-  Json list = Json::array();
-  for (const Vec3& l : lights) list.push_back(Json::array({l[0], l[1], l[2]}));
-  return list;
-}
-
 constexpr std::array<std::pair<const char*, RenderMode>, 5> kModes{{{"dvr", RenderMode::dvr},
                                                                     {"iso", RenderMode::iso},
                                                                     {"mip", RenderMode::mip},
@@ -85,13 +79,9 @@ std::int64_t count_of(const Json& j, const char* name, const std::filesystem::pa
   return member.get<std::int64_t>();
 }
 
-/// From black to white.
-Json window_json(const RenderOptions& o) {
-  return Json::array({o.slice_range.value().first, o.slice_range.value().second});
-}
-void read_window(const Json& j, RenderOptions& o) {
-  const auto range = j.at("range").get<std::array<double, 2>>();
-  o.slice_range = std::pair{range[0], range[1]};
+std::pair<double, double> range_of(const Json& j, const char* name) {
+  const auto ends = j.at(name).get<std::array<double, 2>>();
+  return {ends[0], ends[1]};
 }
 
 /// What a mode has of its own.
@@ -104,8 +94,8 @@ Json mode_json(const RenderOptions& o) {
   }
   if (o.mode == RenderMode::slice)
     json["slice"] = {
-        {"axis", o.slice_axis}, {"position", o.slice_position.value()}, {"range", window_json(o)}};
-  if (o.mode == RenderMode::integral) json["integral"] = {{"range", window_json(o)}};
+        {"axis", o.slice_axis}, {"position", o.slice_position.value()}, {"range", o.slice_range.value()}};
+  if (o.mode == RenderMode::integral) json["integral"] = {{"range", o.slice_range.value()}};
   return json;
 }
 
@@ -119,7 +109,7 @@ void read_mode(const Json& j, const std::filesystem::path& path, RenderOptions& 
   if (o.mode == RenderMode::iso)
     o.surfaces = {{j.at("iso").get<double>(), j.at("iso_opacity").get<double>(),
                    j.at("iso_rgb").get<std::array<double, 3>>()}};
-  if (o.mode == RenderMode::integral) read_window(j.at("integral"), o);
+  if (o.mode == RenderMode::integral) o.slice_range = range_of(j.at("integral"), "range");
   if (o.mode != RenderMode::slice) return;
   const Json& slice = j.at("slice");
   const std::int64_t axis = count_of(slice, "axis", path);
@@ -127,14 +117,12 @@ void read_mode(const Json& j, const std::filesystem::path& path, RenderOptions& 
     throw FileError(fmt::format("{}: `slice.axis`: {} is not 0, 1 or 2", path.string(), axis));
   o.slice_axis = static_cast<int>(axis);
   o.slice_position = slice.at("position").get<double>();
-  read_window(slice, o);
+  o.slice_range = range_of(slice, "range");
 }
 
 Json picture_json(const PictureRecord& record, const std::string& name, const std::string& sha256,
                   const PictureFile& file) {
   const RenderOptions& o = record.options;
-  Json overlays = Json::array();
-  for (const std::string& overlay : file.overlays) overlays.push_back(overlay);
   Json json = {{"file", name},
                {"sha256", record.pixels_sha256},
                {"file_sha256", sha256},
@@ -153,9 +141,9 @@ Json picture_json(const PictureRecord& record, const std::string& name, const st
                             : o.gradient == GradientKind::stored ? "stored"
                                                                  : "central"},
                {"head_light", o.head_light},
-               {"lights", light_list(o.lights)},
+               {"lights", o.lights},
                {"clip", clip_json(o.clip.value_or(Clip{}))},
-               {"overlays", overlays}};
+               {"overlays", file.overlays}};
   json.update(mode_json(o));
   if (file.band_at_white) json["band_at_white"] = *file.band_at_white;
   return json;
@@ -280,8 +268,7 @@ Json certificate_head(const CertifiedPicture& picture, const Json& described) {
             {"epsilon", picture.epsilon},
             {"epsilon_abs", picture.epsilon_abs}}},
           {"picture", described},
-          {"covered",
-           {{"radius", r.covered.radius}, {"z", Json::array({r.covered.z.first, r.covered.z.second})}}},
+          {"covered", {{"radius", r.covered.radius}, {"z", r.covered.z}}},
           {"sampler", r.options.sampler == SamplerKind::image3d ? "image3d" : "buffer"},
           {"sampler_term", sampler_json(r.sampler)},
           {"kappa", r.certify.kappa},
@@ -324,8 +311,7 @@ PictureRecord read_record(const Json& j, const std::filesystem::path& path) {
   record.certify.fast = j.at("fast").get<bool>();
   record.certify.box = is_box(j.value("step", "box"), path);
   record.covered.radius = j.at("covered").at("radius").get<double>();
-  const auto z = j.at("covered").at("z").get<std::array<double, 2>>();
-  record.covered.z = {z[0], z[1]};
+  record.covered.z = range_of(j.at("covered"), "z");
   o.sampler = j.at("sampler").get<std::string>() == "image3d" ? SamplerKind::image3d : SamplerKind::buffer;
   record.lit = o.mode == RenderMode::dvr && o.shading &&
                j.at("light").get<std::string>() == text_of(CertifiedLight::lit);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/picture/canvas.hpp"
 #include "vdvr/expert/certify_picture.hpp"
 #include "vdvr/expert/decorate.hpp"
 
@@ -12,9 +13,6 @@ namespace {
 
 constexpr std::int64_t kMargin = 110, kBelow = 44;
 constexpr std::array<std::uint8_t, 3> kPaper{24, 24, 24}, kUntested{120, 120, 120};
-// With rising luminance, so that it reads in print too.
-constexpr std::array<std::array<double, 3>, 5> kStops{
-    {{0, 0, 8}, {80, 18, 120}, {190, 55, 85}, {248, 142, 10}, {252, 255, 165}}};
 
 /// A root spreads the small bounds, which most pixels have.
 std::array<double, 3> colour_of(double level, double most) {
@@ -22,7 +20,7 @@ std::array<double, 3> colour_of(double level, double most) {
   const auto i = std::min<std::size_t>(3, static_cast<std::size_t>(x));
   std::array<double, 3> c{};
   for (std::size_t k = 0; k < 3; ++k)
-    c[k] = kStops[i][k] + (x - static_cast<double>(i)) * (kStops[i + 1][k] - kStops[i][k]);
+    c[k] = kErrorStops[i][k] + (x - static_cast<double>(i)) * (kErrorStops[i + 1][k] - kErrorStops[i][k]);
   return c;
 }
 

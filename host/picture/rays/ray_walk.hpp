@@ -14,7 +14,6 @@
 #include "host/field/fbp/coverage.hpp"
 #include "host/volume/brick_layout.hpp"
 #include "vdvr/expert/camera.hpp"
-#include "vdvr/expert/certificate.hpp"
 #include "vdvr/expert/mixed_volume.hpp"
 #include "vdvr/raycast.hpp"
 

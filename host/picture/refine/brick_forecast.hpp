@@ -8,7 +8,6 @@
 
 #include "host/certify/gold/gold_batch.hpp"
 #include "vdvr/expert/mixed_volume.hpp"
-#include "vdvr/expert/reconstruct.hpp"
 
 namespace vdvr {
 

@@ -1,5 +1,4 @@
 // Cameras, and the one check of them.
-#include <cmath>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>

@@ -2,7 +2,6 @@
 // 8 bits; tests and benches use it.
 #pragma once
 
-#include <array>
 #include <chrono>
 #include <cstdint>
 #include <functional>

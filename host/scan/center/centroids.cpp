@@ -2,8 +2,6 @@
 // (Helgason and Ludwig).
 #include "host/scan/center/centroids.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>

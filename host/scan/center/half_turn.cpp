@@ -4,8 +4,6 @@
 // its ends: see from_ends.
 #include "host/scan/center/half_turn.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>

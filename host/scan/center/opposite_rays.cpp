@@ -1,8 +1,6 @@
 // Opposite rays, correlated.
 #include "host/scan/center/opposite_rays.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 

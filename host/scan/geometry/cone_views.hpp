@@ -2,7 +2,6 @@
 // of this room.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>

@@ -11,6 +11,7 @@ namespace vdvr {
 namespace {
 
 using Complex = ChirpSums::Complex;
+using fft::product;
 
 std::int64_t length_for(IndexRange in, IndexRange out) {
   return static_cast<std::int64_t>(std::bit_ceil(count(in.count + out.count - 1)));
@@ -21,11 +22,6 @@ Complex chirp(long double step, std::int64_t k) {
   const auto squared = static_cast<long double>(k) * static_cast<long double>(k);
   const long double angle = std::numbers::pi_v<long double> * std::fmod(step * squared, 2.0L);
   return {static_cast<double>(std::cos(angle)), static_cast<double>(std::sin(angle))};
-}
-
-// std::complex's own product looks for NaN.
-Complex product(Complex a, Complex b) {
-  return {a.real() * b.real() - a.imag() * b.imag(), a.real() * b.imag() + a.imag() * b.real()};
 }
 
 std::vector<Complex> chirps(long double step, IndexRange over) {

@@ -1,7 +1,5 @@
 #include "host/scan/prepare/heights.hpp"
 
-#include <fmt/format.h>
-
 #include "host/scan/prepare/common_heights.hpp"
 #include "host/scan/prepare/series_of_heights.hpp"
 #include "host/scan/prepare/upright_rows.hpp"

@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "host/scan/raw/data_exchange.hpp"
 #include "host/scan/raw/nxtomo.hpp"
 #include "vdvr/error.hpp"

@@ -11,6 +11,7 @@
 namespace vdvr {
 namespace {
 
+using fft::product;
 using std::numbers::pi;
 using Complex = std::complex<double>;
 
@@ -34,11 +35,6 @@ double dirichlet(std::int64_t q, std::int64_t columns) {
   const double unit = pi / static_cast<double>(4 * n);
   return std::sin(unit * static_cast<double>(turn)) /
          (std::sin(unit * static_cast<double>(q)) * static_cast<double>(2 * n));
-}
-
-// std::complex's own product looks for NaN.
-Complex product(Complex a, Complex b) {
-  return {a.real() * b.real() - a.imag() * b.imag(), a.real() * b.imag() + a.imag() * b.real()};
 }
 
 }  // namespace

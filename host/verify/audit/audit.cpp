@@ -2,7 +2,6 @@
 #include "vdvr/expert/audit.hpp"
 
 #include <algorithm>
-#include <utility>
 
 #include "host/base/opencl/host_memory.hpp"
 #include "host/field/fbp/coverage.hpp"
@@ -66,7 +65,6 @@ Audit audit(Device& device, const ProjectionSet& scan, const Volume& volume, con
   if (out.registration->center != 0)
     then.field.center = stated_center(options.field, scan.geometry) + out.registration->center;
   out.registered = figures_of(device, scan, right, then, progress);
-  out.registered_grid = right.grid;
   return out;
 }
 

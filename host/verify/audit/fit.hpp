@@ -2,7 +2,6 @@
 // volume.
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
 #include "host/field/fbp/coverage.hpp"

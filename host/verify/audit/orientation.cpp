@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <numeric>
 
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"

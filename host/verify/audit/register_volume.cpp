@@ -37,7 +37,6 @@ class Fitter {
     moves_center_ = !extension.half_acquisition.value_or(false);
   }
 
-  [[nodiscard]] bool moves_center() const { return moves_center_; }
   [[nodiscard]] LinearFit fit(const FitSettings& s) { return linear_fit(w_, field(s)); }
   [[nodiscard]] bool is_constant() const {
     return *std::min_element(w_.begin(), w_.end()) == *std::max_element(w_.begin(), w_.end());

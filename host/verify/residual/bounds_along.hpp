@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "host/verify/residual/covered_chords.hpp"
 #include "vdvr/expert/mixed_volume.hpp"
 #include "vdvr/expert/projections.hpp"
 

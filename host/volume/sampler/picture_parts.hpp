@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <functional>
 #include <glm/vec3.hpp>
-#include <optional>
 #include <variant>
 #include <vector>
 

@@ -81,7 +81,6 @@ struct Audit {
   AuditFigures as_is;
   std::optional<Registration> registration;  ///< absent with AuditOptions::as_is
   std::optional<AuditFigures> registered;    ///< where something was named: of W when that is put right
-  Grid registered_grid;                      ///< and the grid that W then has
 };
 
 /// Where a volume's samples lie, in the scan's unit; what is not said is the file's.

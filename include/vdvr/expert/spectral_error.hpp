@@ -34,9 +34,8 @@ struct AmplitudeSum {
   int rate = 1;
   double centre =
       0;  ///< with 1 - prod cos: what the error would be with all waves peaking at one cell's centre
-  double bound = 0;          ///< with wave_error_bound: proved
-  double sum_over_axes = 0;  ///< with the sum of 1 - cos(kappa_j / 2), capped at 2: proved, looser
-  double largest_term = 0;   ///< the largest |A| wave_error_bound
+  double bound = 0;         ///< with wave_error_bound: proved
+  double largest_term = 0;  ///< the largest |A| wave_error_bound
 };
 /// `spectrum` as cosine_spectrum leaves it. Cost: one map entry on the device per coefficient, in slabs.
 VDVR_API AmplitudeSum amplitude_sum(Device& device, const std::vector<float>& spectrum, const Index3& size,
