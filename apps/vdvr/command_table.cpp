@@ -163,7 +163,7 @@ std::vector<Command> all_commands() {
                  .usage = "fbp|build|render ...",
                  .purpose = "timings: a table on a terminal, else one JSON line per case",
                  .run = bench_command,
-                 .cases = {"fbp", "fdk", "build", "render", "tune"},
+                 .cases = {"fbp", "fdk", "build", "render"},
                  .examples = {{"vdvr bench fbp --size 256", "the reconstruction alone"},
                               {"vdvr bench render volume.vdvr", "frames per second"}}});
   return all;

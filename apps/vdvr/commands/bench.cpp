@@ -18,9 +18,7 @@
 #include "apps/vdvr/source.hpp"
 #include "apps/vdvr/view.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/expert/certified_region.hpp"
 #include "vdvr/expert/simulate.hpp"
-#include "vdvr/expert/tune.hpp"
 
 namespace vdvr::cli {
 namespace {
@@ -310,52 +308,6 @@ int bench_render(Arguments& args) {
   return 0;
 }
 
-Json row_of(const TuneCandidate& c) {
-  return {{"lanes", c.lanes}, {"tile", c.tile},   {"vectors", c.vectors},
-          {"tiles", c.tiles}, {"local", c.local}, {"gups", c.gups}};
-}
-
-/// Launch parameters measured on this device, as a row for the table of host/base/opencl/column_tuning.cpp.
-int bench_tune(Arguments& args) {
-  args.value("size", "256", "samples per axis, and detector columns and rows (default 256)")
-      .value("angles", "180", "views (default 180)")
-      .value("repetitions", "N", "default 5");
-  add_common(args);
-  if (!args.parse()) return 0;
-  const CommonOptions common = common_options(args);
-  const std::int64_t size = args.integer_or("size", 256, 16, 2048);
-  const std::int64_t views = args.integer_or("angles", 180, 2, 1 << 14);
-  const int repetitions = static_cast<int>(args.integer_or("repetitions", 5, 1, 1000));
-  Device device = open_device(common);
-  ProgressLine progress(args.who(), common.quiet);
-  const TuneResult result = tune(device, size, views, repetitions, progress.callback());
-  progress.clear();
-  Json candidates = Json::array(), filters = Json::array(), recorded;
-  for (const TuneCandidate& c : result.candidates) {
-    candidates.push_back(row_of(c));
-    if (c.recorded) recorded = row_of(c);
-  }
-  for (const TuneFilter& f : result.filters)
-    filters.push_back({{"columns", f.columns},
-                       {"product_seconds", f.product_seconds},
-                       {"fourier_seconds", f.fourier_seconds}});
-  Json best = row_of(result.candidates.front());
-  best["device_class"] = device.info().is_gpu ? "gpu" : "cpu";
-  best["product_columns"] = result.product_columns;
-  const Json line = {{"case", "tune"},
-                     {"device", device.info().name},
-                     {"driver", device.info().driver},
-                     {"size", size},
-                     {"angles", views},
-                     {"repetitions", repetitions},
-                     {"row", best},
-                     {"recorded", recorded},
-                     {"candidates", candidates},
-                     {"filters", filters}};
-  print_line(common, line);
-  return 0;
-}
-
 }  // namespace
 
 int bench_command(Arguments& args) {
@@ -364,18 +316,17 @@ int bench_command(Arguments& args) {
   if (name == "fdk") return bench_reconstruction(args, name, 10.0);
   if (name == "build") return bench_build(args);
   if (name == "render") return bench_render(args);
-  if (name == "tune") return bench_tune(args);
   if (name == "paper") throw InputError("the paper's figures and tables are made by the program vdvr-paper");
   if (!name.empty())
-    throw InputError(fmt::format(
-        "'{}' is not a case of this version; there are fbp, fdk, build, render, tune", name));
+    throw InputError(
+        fmt::format("'{}' is not a case of this version; there are fbp, fdk, build, render", name));
   args.group(
           "Cases: fbp [--size N --angles K] | fdk [--size N --angles K] | build IN --epsilon E | "
-          "render FILE [--frames N] | tune; each has its own --help")
+          "render FILE [--frames N]; each has its own --help")
       .flag("help,h", "this text")
       .flag("help-all", "the same");
   if (!args.parse()) return 0;
-  throw InputError("name a case: fbp, fdk, build, render or tune");
+  throw InputError("name a case: fbp, fdk, build or render");
 }
 
 }  // namespace vdvr::cli
