@@ -37,7 +37,6 @@ class MeasuredRegion {
     double at = 0;
   };
   [[nodiscard]] std::optional<Plane> mask_plane(const Vec3& low, const Vec3& high) const;
-  [[nodiscard]] bool has_mask() const { return mask_ != nullptr; }
   /// Whether what the region has across z is the same at all heights between two of faces(2).
   [[nodiscard]] bool is_upright() const;
   /// Of an axis, ascending: where the region begins, the mask's faces within, where it ends.
