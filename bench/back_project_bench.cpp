@@ -1,5 +1,6 @@
-// Back-projection alone: 256^3 samples from 180 views of 256 x 256, items = sample updates; and the same
-// beside a loop written by hand for AVX-512, turn by turn in one run, with the ratio of the two.
+// Back-projection alone: 256^3 samples from 180 views of 256 x 256, items = sample updates; the same beside a
+// loop written by hand for AVX-512, turn by turn in one run, with the ratio of the two; and the same with
+// each candidate for a row of host/base/opencl/column_tuning.cpp, with the ramp filter in both its ways.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -10,6 +11,7 @@
 #include "bench/hand_loop.hpp"
 #include "host/base/opencl/kernel.hpp"
 #include "host/field/fbp/back_project.hpp"
+#include "host/field/fbp/filter_rows.hpp"
 #include "host/field/fbp/reconstruct.hpp"
 #include "vdvr/device.hpp"
 
@@ -17,15 +19,22 @@ using namespace vdvr;
 
 namespace {
 
+ProjectionSet scan_of(std::int64_t columns, std::int64_t rows, std::int64_t views) {
+  ProjectionSet scan;
+  scan.geometry.columns = columns;
+  scan.geometry.rows = rows;
+  scan.geometry.center = 0.5 * static_cast<double>(columns - 1);
+  for (std::int64_t i = 0; i < views; ++i)
+    scan.geometry.theta_rad.push_back(std::numbers::pi * static_cast<double>(i) / static_cast<double>(views));
+  scan.data.resize(static_cast<std::size_t>(scan.size()));
+  for (std::size_t i = 0; i < scan.data.size(); ++i) scan.data[i] = static_cast<float>(i % 7);
+  return scan;
+}
+
 // n^3 samples of step 1 / rate about the axis, from k views of n x n.
 struct Problem {
   Problem(std::int64_t size, std::int64_t views, int upsampling) : n(size), k(views), rate(upsampling) {
-    scan.geometry.columns = scan.geometry.rows = n;
-    scan.geometry.center = 0.5 * static_cast<double>(n - 1);
-    for (std::int64_t i = 0; i < k; ++i)
-      scan.geometry.theta_rad.push_back(std::numbers::pi * static_cast<double>(i) / static_cast<double>(k));
-    scan.data.resize(static_cast<std::size_t>(scan.size()));
-    for (std::size_t i = 0; i < scan.data.size(); ++i) scan.data[i] = static_cast<float>(i % 7);
+    scan = scan_of(n, n, k);
     filtered = filter_projections(device.state(), scan, {});
     Upsampler upsampler(device.state(), filtered);
     // So wide that no corner of the grid falls off the detector: nothing is clamped.
@@ -46,7 +55,7 @@ struct Problem {
                   1.0 / rate,
                   1.0 / rate,
                   {{first(), first() + static_cast<double>(y) / rate}}},
-                 filter, out);
+                 filter, out, tuning);
   }
   void back_project_all(Interpolation filter) {
     for (std::int64_t y = 0; y < n; y += band) back_project_band(y, filter);
@@ -57,6 +66,7 @@ struct Problem {
   std::int64_t n, k;
   int rate;
   Device device;
+  ColumnTuning tuning = column_tuning(device.info());
   ProjectionSet scan;
   FilteredScan filtered;
   UpsampledSlab slab;
@@ -149,6 +159,63 @@ void beside_hand_loop(benchmark::State& bench) {
   bench.counters["difference"] = differs;
 }
 
+// Lanes, tile, vectors, tiles and work-group of a candidate; tests/device/back_project_test.cpp holds the
+// samples of such candidates to the reference.
+void tuning(benchmark::State& bench) {
+  Problem problem(256, 180, 1);
+  ColumnTuning& t = problem.tuning;
+  t.lanes = static_cast<int>(bench.range(0));
+  t.tile = static_cast<int>(bench.range(1));
+  t.vectors = static_cast<int>(bench.range(2));
+  t.tiles = static_cast<int>(bench.range(3));
+  for (std::size_t a = 0; a < 3; ++a) t.local[a] = static_cast<std::uint64_t>(bench.range(4 + a));
+  if (t.local[0] * t.local[1] * t.local[2] > problem.device.info().max_work_group) {
+    bench.SkipWithError("the device has no such work-group");
+    return;
+  }
+  problem.back_project_all(Interpolation::linear);  // also builds the kernel
+  for (auto _ : bench) problem.back_project_all(Interpolation::linear);
+  bench.counters["updates"] = benchmark::Counter(problem.updates() * static_cast<double>(bench.iterations()),
+                                                 benchmark::Counter::kIsRate);
+}
+
+using WorkGroup = std::array<std::int64_t, 3>;
+
+void add_candidates(benchmark::internal::Benchmark* bench, std::int64_t lanes, std::int64_t tiles,
+                    std::initializer_list<WorkGroup> groups) {
+  for (const int tile : {1, 8})
+    for (const int vectors : {1, 2})
+      for (const WorkGroup& g : groups) bench->Args({lanes, tile, vectors, tiles, g[0], g[1], g[2]});
+}
+
+void candidates_of_gpus(benchmark::internal::Benchmark* bench) {
+  for (const int lanes : {1, 4})
+    add_candidates(bench, lanes, 1, {{32, 4, 2}, {16, 4, 4}, {64, 2, 1}, {32, 8, 1}});
+}
+
+void candidates_of_cpus(benchmark::internal::Benchmark* bench) {
+  for (const int lanes : {8, 16}) {
+    add_candidates(bench, lanes, 1, {{1, 8, 16}, {1, 4, 8}, {1, 16, 16}});
+    // Many tiles are a work-group's worth of work by themselves.
+    for (const int tiles : {2, 4, 8}) add_candidates(bench, lanes, tiles, {{1, 1, 1}});
+  }
+}
+
+// The same number of pixels in rows of so many columns, filtered by FFT (0) or by product (1): up to where
+// the product is faster a row's product_columns go.
+void ramp_filter(benchmark::State& bench) {
+  const std::int64_t columns = bench.range(0), rows = 64, views = (1 << 22) / (rows * columns);
+  Device device;
+  if (!has_transform(device.info(), columns, fft::Precision::fp64)) {
+    bench.SkipWithError("the device has no transform of so many columns");
+    return;
+  }
+  const ProjectionSet scan = scan_of(columns, rows, views);
+  const FilterMethod method = bench.range(1) ? FilterMethod::product : FilterMethod::fourier;
+  filter_projections(device.state(), scan, {}, {}, method);  // also builds the kernels
+  for (auto _ : bench) filter_projections(device.state(), scan, {}, {}, method);
+}
+
 BENCHMARK(back_projection)
     ->Args({256, 180, 1, 0})
     ->Args({256, 180, 1, 1})
@@ -158,5 +225,19 @@ BENCHMARK(back_projection)
     ->MeasureProcessCPUTime()
     ->UseRealTime();
 BENCHMARK(beside_hand_loop)->Unit(benchmark::kMillisecond)->UseManualTime()->Iterations(9);
+BENCHMARK(tuning)
+    ->Name("tuning_gpu")
+    ->Apply(candidates_of_gpus)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+BENCHMARK(tuning)
+    ->Name("tuning_cpu")
+    ->Apply(candidates_of_cpus)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+BENCHMARK(ramp_filter)
+    ->ArgsProduct({{256, 512, 1024, 2048, 4096}, {0, 1}})
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
 
 }  // namespace

@@ -15,6 +15,7 @@
 #include "vdvr/device.hpp"
 #include "vdvr/expert/image.hpp"
 #include "vdvr/expert/progress.hpp"
+#include "vdvr/expert/spectral_error.hpp"
 
 namespace vdvr::paper {
 
@@ -110,8 +111,8 @@ Json curves_figure(const std::string& name, const std::string& caption, const Cu
 void add_projection_errors(Report& run);
 void add_spectra(Report& run, const ProjectionSet& scan, const Grid& grid, const std::string& name);
 /// Fig. 5's pictures: the spectra of a row, of a projection and of the 1x volume, and what interpolation does
-/// to them; adds figures to the section. Their numbers.
-Json add_spectrum_figures(Report& run, Section& section, const ProjectionSet& scan, const Volume& base,
+/// to them; adds figures to the section.
+void add_spectrum_figures(Report& run, Section& section, const FilteredView& view, const Volume& base,
                           double range);
 
 /// A certified or comparison volume of Marschner-Lobb with what was measured of it, interior.

@@ -8,9 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/paper/report.hpp"
-#include "vdvr/expert/cosine_spectrum.hpp"
+#include "apps/paper/upsample_volume.hpp"
 #include "vdvr/expert/error_map.hpp"
-#include "vdvr/expert/spectral_error.hpp"
 
 namespace vdvr::paper {
 namespace {
@@ -22,33 +21,22 @@ constexpr std::int64_t kCurvePoints = 400;  // of an error over frequency
 /// A spectrum with everything that is said about it.
 struct Spectrum {
   Index3 size{1, 1, 1};
-  std::vector<float> coefficients;   ///< [z][y][x]
-  double reference = 0;              ///< what sums are given as a part of
-  std::vector<AmplitudeSum> sums{};  ///< by kRates
+  std::vector<float> coefficients;  ///< [z][y][x]
+  double reference = 0;             ///< what sums are given as a part of
+  std::vector<double> sums{};       ///< by kRates
 };
 
 Spectrum make_spectrum(Report& run, std::vector<float> samples, const Index3& size, double reference) {
-  Spectrum s{size, std::move(samples), reference};
-  cosine_spectrum(run.device, s.coefficients, size, run.progress);
+  Spectrum s{size, cosine_spectrum(std::move(samples), size, run.progress), reference};
   for (const int rate : kRates) s.sums.push_back(amplitude_sum(run.device, s.coefficients, size, rate));
   return s;
 }
 
-Json spectrum_json(const Spectrum& s) {
-  Json sums = Json::array();
-  for (const auto& a : s.sums)
-    sums.push_back({{"rate", a.rate},
-                    {"amplitude_bound", a.bound},
-                    {"amplitude_bound_relative", s.reference > 0 ? Json(a.bound / s.reference) : Json()},
-                    {"largest_term", a.largest_term}});
-  return {{"coefficients", s.size}, {"reference", s.reference}, {"sums", sums}};
-}
-
 std::string sums_text(const Spectrum& s, const std::string& of) {
   std::string text = "Sum of amplitude times error over all frequencies, % of " + of + ":";
-  for (const auto& a : s.sums)
-    text += fmt::format("{} {}x {:.3g}", a.rate == 1 ? "" : ",", a.rate,
-                        s.reference > 0 ? 100 * a.bound / s.reference : 0);
+  for (std::size_t r = 0; r < kRates.size(); ++r)
+    text += fmt::format("{} {}x {:.3g}", r == 0 ? "" : ",", kRates[r],
+                        s.reference > 0 ? 100 * s.sums[r] / s.reference : 0);
   return text + "; an upper bound, loose, which decides nothing.";
 }
 
@@ -223,9 +211,8 @@ void volume_figures(Report& run, Section& section, const Spectrum& s) {
 
 }  // namespace
 
-Json add_spectrum_figures(Report& run, Section& section, const ProjectionSet& scan, const Volume& base,
+void add_spectrum_figures(Report& run, Section& section, const FilteredView& view, const Volume& base,
                           double range) {
-  const FilteredView view = strongest_view(run.device, scan, {}, run.progress);
   const std::int64_t middle = view.rows / 2;
   const auto begin = view.samples.begin() + middle * view.columns;
   const Spectrum row = make_spectrum(run, {begin, begin + view.columns}, {view.columns, 1, 1}, view.largest),
@@ -235,10 +222,6 @@ Json add_spectrum_figures(Report& run, Section& section, const ProjectionSet& sc
       row_figure(run, row, fmt::format("row {} of filtered view {}", middle, view.view)));
   projection_figures(run, section, projection, fmt::format("filtered view {}", view.view));
   volume_figures(run, section, volume);
-  return {{"view", {{"index", view.view}, {"row", middle}}},
-          {"row", spectrum_json(row)},
-          {"projection", spectrum_json(projection)},
-          {"volume", spectrum_json(volume)}};
 }
 
 }  // namespace vdvr::paper

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <vector>
 
 #include "apps/paper/parallel_rows.hpp"
 #include "vdvr/error.hpp"
@@ -40,12 +39,24 @@ std::vector<double> axis_matrix(std::int64_t old_cells, std::int64_t new_cells) 
   return matrix;
 }
 
+/// double matrix[m][i]: the coefficients of that series.
+std::vector<double> analysis_matrix(std::int64_t n) {
+  std::vector<double> matrix(static_cast<std::size_t>(n * n));
+  for (std::int64_t i = 0; i < n; ++i) {
+    const std::vector<double> at = waves(n, static_cast<double>(i));
+    for (std::int64_t m = 0; m < n; ++m)
+      matrix[static_cast<std::size_t>(m * n + i)] =
+          (m == 0 ? 1 : 2) * at[static_cast<std::size_t>(m)] / static_cast<double>(n);
+  }
+  return matrix;
+}
+
 /// out[outer][m][inner] = matrix[m][n] in[outer][n][inner].
 std::vector<float> along_axis(const std::vector<float>& in, const std::vector<double>& matrix,
                               std::int64_t outer, std::int64_t n, std::int64_t m, std::int64_t inner,
-                              const Progress& progress) {
+                              const Progress& progress, const std::string& stage) {
   std::vector<float> out(static_cast<std::size_t>(outer * m * inner));
-  parallel_rows(outer * m, progress, "upsample volume", [&](std::int64_t row) {
+  parallel_rows(outer * m, progress, stage, [&](std::int64_t row) {
     const std::int64_t block = row / m, j = row % m;
     std::vector<double> sum(static_cast<std::size_t>(inner));
     for (std::int64_t i = 0; i < n; ++i) {
@@ -78,13 +89,25 @@ Volume upsample_volume(const Volume& volume, const Index3& cells, const Progress
   }
   const Index3 from = grid.samples(), to = out.grid.samples();
   // The slowest axis last: the rows that are combined are then whole, and the small volume goes first.
-  out.samples = along_axis(volume.samples, axis_matrix(grid.cells[0], cells[0]), from[2] * from[1], from[0],
-                           to[0], 1, progress);
-  out.samples =
-      along_axis(out.samples, axis_matrix(grid.cells[1], cells[1]), from[2], from[1], to[1], to[0], progress);
-  out.samples = along_axis(out.samples, axis_matrix(grid.cells[2], cells[2]), 1, from[2], to[2],
-                           to[1] * to[0], progress);
+  out.samples = volume.samples;
+  std::int64_t inner = 1, outer = grid.sample_count();
+  for (std::size_t a = 0; a < 3; ++a) {
+    outer /= from[a];
+    out.samples = along_axis(out.samples, axis_matrix(grid.cells[a], cells[a]), outer, from[a], to[a], inner,
+                             progress, "upsample volume");
+    inner *= to[a];
+  }
   return out;
+}
+
+std::vector<float> cosine_spectrum(std::vector<float> values, const Index3& size, const Progress& progress) {
+  std::int64_t inner = 1;
+  for (const std::int64_t n : size) {
+    values = along_axis(values, analysis_matrix(n), static_cast<std::int64_t>(values.size()) / (inner * n), n,
+                        n, inner, progress, "spectrum");
+    inner *= n;
+  }
+  return values;
 }
 
 Index3 cells_for_samples(const Index3& cells, double samples) {

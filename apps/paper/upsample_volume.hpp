@@ -1,6 +1,9 @@
-// Frequency-domain upsampling of a stored volume, what the paper sets certified volumes against (Figs. 11 and
-// 14): the spectrum of the samples, padded with zeros. Called by the sections of the report.
+// The spectrum of an image or volume (Fig. 5), and frequency-domain upsampling of a stored volume, what the
+// paper sets certified volumes against (Figs. 11 and 14): the spectrum of the samples, padded with zeros.
+// Called by the sections of the report.
 #pragma once
+
+#include <vector>
 
 #include "vdvr/expert/grid.hpp"
 #include "vdvr/expert/progress.hpp"
@@ -16,6 +19,12 @@ namespace vdvr::paper {
 /// volume in between, twice. Throws InputError for a size below 1 cell or a volume that does not match its
 /// grid.
 Volume upsample_volume(const Volume& volume, const Index3& cells, const Progress& progress = {});
+
+/// The cosine coefficients of the same extension: float values[z][y][x] of `size` (x, y, z) become
+/// a[m_z][m_y][m_x], with values = sum over m of a times the product of cos(pi m_j (x_j + 1/2) / n_j). Cost
+/// as above.
+std::vector<float> cosine_spectrum(std::vector<float> values, const Index3& size,
+                                   const Progress& progress = {});
 
 /// Cells per axis, in the proportions of `cells`, whose samples are as near as can be to `samples` in number:
 /// the uniform grid that takes the place of a certified volume.

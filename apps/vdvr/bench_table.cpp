@@ -20,12 +20,9 @@ bool is_spread(const Json& value) {
   return value.is_object() && value.size() == 3 && value.contains("min") && value.contains("median");
 }
 
-bool is_table(const Json& value) { return value.is_array() && !value.empty() && value[0].is_object(); }
-
 /// A figure in the four digits that a timing has.
 std::string figure(const Json& value) {
   if (value.is_string()) return value.get<std::string>();
-  if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
   if (value.is_number_float()) return fmt::format("{:.4g}", value.get<double>());
   if (is_spread(value))
     return fmt::format("{} ({} to {})", figure(value["median"]), figure(value["min"]), figure(value["max"]));
@@ -53,29 +50,12 @@ std::string aligned(const std::vector<Row>& rows, const std::string& indent) {
   return text;
 }
 
-/// A row for each object, a column for each name that any of them has.
-std::vector<Row> table_of(const Json& objects) {
-  std::vector<std::string> names;
-  for (const Json& object : objects)
-    for (const auto& [name, value] : object.items())
-      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
-  std::vector<Row> rows(1);
-  for (const auto& name : names) rows[0].push_back(words_of(name));
-  for (const Json& object : objects) {
-    rows.emplace_back();
-    for (const auto& name : names) rows.back().push_back(object.contains(name) ? figure(object[name]) : "");
-  }
-  return rows;
-}
-
 /// The figures first, then what has a heading of its own.
 std::string section(const Json& object, const std::string& indent) {
   std::vector<Row> figures;
   std::string below;
   for (const auto& [name, value] : object.items()) {
-    if (is_table(value)) {
-      below += indent + words_of(name) + "\n" + aligned(table_of(value), indent + "  ");
-    } else if (value.is_object() && !is_spread(value)) {
+    if (value.is_object() && !is_spread(value)) {
       below += indent + words_of(name) + "\n" + section(value, indent + "  ");
     } else {
       figures.push_back({words_of(name), figure(value)});

@@ -36,8 +36,7 @@ void print_noise(const NoiseFound& found) {
   fmt::print("  noise        {}\n", found.noise ? found.noise->words : "not known: " + found.why);
 }
 
-std::optional<FieldNoise> noise_of_plan(Device& device, const Planned& planned, const Wanted* compared,
-                                        const Progress& progress) {
+std::optional<FieldNoise> noise_of_plan(Device& device, const Planned& planned, const Progress& progress) {
   if (!planned.noise.noise || !planned.made.sigma) return std::nullopt;
   const Plan& plan = planned.made.plan;
   FieldNoise out;
@@ -46,10 +45,6 @@ std::optional<FieldNoise> noise_of_plan(Device& device, const Planned& planned, 
   out.split = split_of_views(device, planned.scan, plan.field, planned.noise.noise->model, progress);
   out.forecasts = forecast_in_sigma(plan, *planned.made.sigma, multiples);
   out.rings = ring_noise(planned.scan, planned.understood.flats);
-  if (compared)
-    out.filters =
-        forecast_filters(device, planned.scan, Tolerance{{}, plan.epsilon_abs}, planned.made.asked.sigmas,
-                         *planned.noise.noise, compared->options, progress);
   return out;
 }
 
@@ -72,10 +67,6 @@ Json field_noise_json(const FieldNoise& noise, const Plan& plan) {
                      {"radius", noise.rings->radius()}};
   for (const SigmaForecast& f : noise.forecasts)
     json["foreseen"].push_back({{"sigmas", f.multiple}, {"samples_ratio", f.samples_ratio}});
-  for (const FilterForecast& f : noise.filters)
-    json["filters"].push_back({{"filter", text_of(f.filter)},
-                               {"sigma", f.sigma.median > 0 ? Json(f.sigma.median) : Json()},
-                               {"samples_ratio", f.samples_ratio > 0 ? Json(f.samples_ratio) : Json()}});
   return json;
 }
 
@@ -99,13 +90,6 @@ void print_field_noise(const FieldNoise& noise, const Plan& plan) {
         "  {:g} sigma      {:.3g} % of the range in the middle: {:.3f} samples per base sample foreseen, "
         "brick by brick\n",
         f.multiple, 100 * f.multiple * median / plan.reference_range, f.samples_ratio);
-  if (!noise.filters.empty())
-    fmt::print("filters        at {}: sigma of F, and samples per base sample foreseen\n",
-               noise.sigmas ? fmt::format("{:g} sigma of each", *noise.sigmas) : "the same epsilon");
-  for (const FilterForecast& f : noise.filters)
-    if (f.samples_ratio > 0)
-      fmt::print("  {:<12} {:.4g}  {:.3f}\n", text_of(f.filter), f.sigma.median, f.samples_ratio);
-    else fmt::print("  {:<12} out of reach\n", text_of(f.filter));
 }
 
 }  // namespace vdvr::cli

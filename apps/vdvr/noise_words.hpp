@@ -20,12 +20,9 @@ struct FieldNoise {
   std::optional<double> sigmas;  ///< asked for by --epsilon
   std::optional<SplitOfViews> split;
   std::vector<SigmaForecast> forecasts;
-  std::optional<RingNoise> rings;       ///< of the flats
-  std::vector<FilterForecast> filters;  ///< where they are asked for
+  std::optional<RingNoise> rings;  ///< of the flats
 };
-/// `wanted`: what was planned; null where filters are not to be compared.
-std::optional<FieldNoise> noise_of_plan(Device& device, const Planned& planned, const Wanted* compared,
-                                        const Progress& progress);
+std::optional<FieldNoise> noise_of_plan(Device& device, const Planned& planned, const Progress& progress);
 Json field_noise_json(const FieldNoise& noise, const Plan& plan);
 void print_field_noise(const FieldNoise& noise, const Plan& plan);
 

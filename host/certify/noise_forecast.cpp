@@ -119,31 +119,6 @@ PlanInSigma make_plan_in_sigma(Device& device, const ProjectionSet& scan, double
   return out;
 }
 
-std::vector<FilterForecast> forecast_filters(Device& device, const ProjectionSet& scan,
-                                             const Tolerance& tolerance, std::optional<double> multiple,
-                                             const ScanNoise& noise, const CertifyOptions& options,
-                                             const Progress& progress) {
-  std::vector<FilterForecast> out;
-  for (const auto& [filter, name] : ramp_windows) {
-    CertifyOptions with = options;
-    with.field.filter = filter;
-    FilterForecast row{filter, 0, {}};
-    try {
-      if (multiple) {
-        const PlanInSigma made = make_plan_in_sigma(device, scan, *multiple, noise, with, progress);
-        row = {filter, made.plan.samples_ratio, made.sigma.range};
-      } else {
-        const Plan plan = make_plan(device, scan, tolerance, with, progress);
-        row = {filter, plan.samples_ratio, sigma_of_plan(device, scan, plan, noise, progress).range};
-      }
-    } catch (const ToleranceError&) {
-      // It says so by storing nothing.
-    }
-    out.push_back(row);
-  }
-  return out;
-}
-
 Refinement refinement_in_sigma(const BrickSigma& sigma, double multiple) {
   Refinement out;
   for (const float s : sigma.of_brick) {

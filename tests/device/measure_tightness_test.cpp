@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE measure_tightness
-#include "vdvr/expert/measure_tightness.hpp"
+#include "tests/support/measure_tightness.hpp"
 
 #include <boost/test/unit_test.hpp>
 #include <cmath>
@@ -18,8 +18,8 @@ BOOST_AUTO_TEST_CASE(bounds_of_marschner_lobb_are_as_tight_as_documented) {
   GridOptions cells;
   cells.size = Index3{64, 64, 64};
   cells.spacing = std::sqrt(0.5);
-  const Tightness t =
-      measure_tightness(device, scan, make_grid(scan.geometry, cells), {}, {8, Interpolation::linear, 8});
+  const support::Tightness t = support::measure_tightness(device, scan, make_grid(scan.geometry, cells), {},
+                                                          {8, Interpolation::linear, 8});
   BOOST_TEST(t.bricks > 0);
   // A bound below its truth is no bound; above these ratios (docs/error-bounds.md) tolerance is wasted.
   BOOST_TEST(t.gold_error > 0);

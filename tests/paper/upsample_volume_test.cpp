@@ -1,4 +1,5 @@
-// Frequency-domain upsampling: waves of the cosine series are kept exactly, samples stay, sizes are met.
+// Frequency-domain upsampling: waves of the cosine series are kept exactly, samples stay, sizes are met. And
+// the spectrum, whose one coefficient such a wave is.
 #define BOOST_TEST_MODULE upsample_volume
 #include <boost/test/unit_test.hpp>
 
@@ -85,6 +86,22 @@ BOOST_AUTO_TEST_CASE(cells_for_samples_come_as_near_as_proportions_allow) {
   BOOST_TEST((cells_for_samples({64, 64, 64}, 129.0 * 129 * 129) == Index3{128, 128, 128}));
   const Index3 c = cells_for_samples({128, 128, 256}, 1e7);
   BOOST_TEST(std::abs(c[2] - 2 * c[0]) <= 1);  // each axis is rounded by itself
+}
+
+BOOST_AUTO_TEST_CASE(a_wave_of_the_mirror_extension_has_one_coefficient) {
+  for (const Index3& cells : {Index3{23, 9, 0}, Index3{4, 69, 2}, Index3{16, 8, 32}})
+    for (const Index3& m : {Index3{0, 0, 0}, Index3{3, 2, 0}, Index3{4, 8, 0}}) {
+      const Volume v = wave_volume(cells, m);
+      const Index3 n = v.grid.samples();
+      const auto spectrum = cosine_spectrum(v.samples, n);
+      const std::int64_t one = (m[2] * n[1] + m[1]) * n[0] + m[0];
+      double worst = 0;
+      for (std::int64_t i = 0; i < v.grid.sample_count(); ++i)
+        worst = std::max(worst, std::abs(static_cast<double>(spectrum[static_cast<std::size_t>(i)]) -
+                                         (i == one ? 1.0 : 0.0)));
+      // Rows of the matrix sum to 2 at most: what is rounded grows by as much an axis.
+      BOOST_TEST(worst <= tolerance::fp32_sum(4, 8));
+    }
 }
 
 BOOST_AUTO_TEST_CASE(sizes_that_mean_nothing_are_refused) {

@@ -18,10 +18,7 @@
 #include "apps/vdvr/source.hpp"
 #include "apps/vdvr/view.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/expert/certified_region.hpp"
-#include "vdvr/expert/measure_tightness.hpp"
 #include "vdvr/expert/simulate.hpp"
-#include "vdvr/expert/tune.hpp"
 
 namespace vdvr::cli {
 namespace {
@@ -311,99 +308,6 @@ int bench_render(Arguments& args) {
   return 0;
 }
 
-/// How tight the bounds are: largest bound over largest truth, which a finer gold shows.
-int bench_bounds(Arguments& args) {
-  args.positional("IN", "projections");
-  add_scan(args);
-  add_field(args);
-  add_grid(args);
-  add_rates(args);
-  add_common(args);
-  if (!args.parse()) return 0;
-  const CommonOptions common = common_options(args);
-  FieldOptions field = field_options(args);
-  const RateOptions rates = rate_options(args);
-  Device device = open_device(common);
-  ProgressLine progress(args.who(), common.quiet);
-  const ProjectionSet scan = load_scan(args.path("IN"), args, field, progress.callback());
-  field.center = stated_center(field, scan.geometry);
-  const Grid grid = certified_grid(scan, field, grid_options(args));
-  const Rates measured{
-      rates.upsampling.value_or(8),
-      rates.interpolation.value_or(scan.cone ? Interpolation::six_taps : Interpolation::linear),
-      rates.gold.value_or(8)};
-  if (scan.cone && (measured.upsampling != 8 || measured.interpolation != Interpolation::six_taps))
-    throw InputError(
-        "cone beam: gold is made of projections at 8x by six taps both ways; leave out `upsampling` and "
-        "`u-filter`");
-  const auto start = Clock::now();
-  const Tightness t = measure_tightness(device, scan, grid, field, measured, progress.callback());
-  const double seconds = since(start);
-  progress.clear();
-  const auto ratio = [](double bound, double error) { return error > 0 ? Json(bound / error) : Json(); };
-  Json line = bench_line("bounds", device, 1);
-  line["cells"] = grid.cells;
-  line["rates"] = {{"upsampling_u", measured.upsampling},
-                   {"u_filter", text_of(measured.interpolation)},
-                   {"gold", measured.gold}};
-  line["seconds"] = spread({seconds});
-  line["bricks"] = t.bricks;
-  line["gold"] = {
-      {"bound", t.gold_bound}, {"error", t.gold_error}, {"ratio", ratio(t.gold_bound, t.gold_error)}};
-  line["projection"] = {{"error", t.projection_error},
-                        {"bound", t.projection_bound},
-                        {"ratio", ratio(t.projection_bound, t.projection_error)}};
-  line["arithmetic"] = t.arithmetic;
-  print_line(common, line);
-  return 0;
-}
-
-Json row_of(const TuneCandidate& c) {
-  return {{"lanes", c.lanes}, {"tile", c.tile},   {"vectors", c.vectors},
-          {"tiles", c.tiles}, {"local", c.local}, {"gups", c.gups}};
-}
-
-/// Launch parameters measured on this device, as a row for the table of host/base/opencl/column_tuning.cpp.
-int bench_tune(Arguments& args) {
-  args.value("size", "256", "samples per axis, and detector columns and rows (default 256)")
-      .value("angles", "180", "views (default 180)")
-      .value("repetitions", "N", "default 5");
-  add_common(args);
-  if (!args.parse()) return 0;
-  const CommonOptions common = common_options(args);
-  const std::int64_t size = args.integer_or("size", 256, 16, 2048);
-  const std::int64_t views = args.integer_or("angles", 180, 2, 1 << 14);
-  const int repetitions = static_cast<int>(args.integer_or("repetitions", 5, 1, 1000));
-  Device device = open_device(common);
-  ProgressLine progress(args.who(), common.quiet);
-  const TuneResult result = tune(device, size, views, repetitions, progress.callback());
-  progress.clear();
-  Json candidates = Json::array(), filters = Json::array(), recorded;
-  for (const TuneCandidate& c : result.candidates) {
-    candidates.push_back(row_of(c));
-    if (c.recorded) recorded = row_of(c);
-  }
-  for (const TuneFilter& f : result.filters)
-    filters.push_back({{"columns", f.columns},
-                       {"product_seconds", f.product_seconds},
-                       {"fourier_seconds", f.fourier_seconds}});
-  Json best = row_of(result.candidates.front());
-  best["device_class"] = device.info().is_gpu ? "gpu" : "cpu";
-  best["product_columns"] = result.product_columns;
-  const Json line = {{"case", "tune"},
-                     {"device", device.info().name},
-                     {"driver", device.info().driver},
-                     {"size", size},
-                     {"angles", views},
-                     {"repetitions", repetitions},
-                     {"row", best},
-                     {"recorded", recorded},
-                     {"candidates", candidates},
-                     {"filters", filters}};
-  print_line(common, line);
-  return 0;
-}
-
 }  // namespace
 
 int bench_command(Arguments& args) {
@@ -412,19 +316,17 @@ int bench_command(Arguments& args) {
   if (name == "fdk") return bench_reconstruction(args, name, 10.0);
   if (name == "build") return bench_build(args);
   if (name == "render") return bench_render(args);
-  if (name == "bounds") return bench_bounds(args);
-  if (name == "tune") return bench_tune(args);
   if (name == "paper") throw InputError("the paper's figures and tables are made by the program vdvr-paper");
   if (!name.empty())
-    throw InputError(fmt::format(
-        "'{}' is not a case of this version; there are fbp, fdk, build, render, bounds, tune", name));
+    throw InputError(
+        fmt::format("'{}' is not a case of this version; there are fbp, fdk, build, render", name));
   args.group(
           "Cases: fbp [--size N --angles K] | fdk [--size N --angles K] | build IN --epsilon E | "
-          "render FILE [--frames N] | bounds IN | tune; each has its own --help")
+          "render FILE [--frames N]; each has its own --help")
       .flag("help,h", "this text")
       .flag("help-all", "the same");
   if (!args.parse()) return 0;
-  throw InputError("name a case: fbp, fdk, build, render, bounds or tune");
+  throw InputError("name a case: fbp, fdk, build or render");
 }
 
 }  // namespace vdvr::cli

@@ -13,7 +13,6 @@
 #include "apps/vdvr/noise_words.hpp"
 #include "apps/vdvr/output.hpp"
 #include "apps/vdvr/picture_forecast.hpp"
-#include "vdvr/error.hpp"
 
 namespace vdvr::cli {
 namespace {
@@ -139,8 +138,6 @@ void print_plan(const Planned& p, const std::optional<PictureForecast>& forecast
 
 int plan_command(Arguments& args) {
   args.positional("IN", "projections")
-      .flag("compare-filters",
-            "also what each ramp filter stores at the same tolerance, and the noise it leaves")
       .value("ranks", "N", "also what N ranks of vdvr-mpi would take, each with a device as this one")
       .value("machines", "M", "on which these ranks are, alike on each (default 1)");
   add_plan_options(args);
@@ -154,8 +151,6 @@ int plan_command(Arguments& args) {
   if (args.has("picture-tolerance"))
     refuse(args, {"ranks"}, "foresees one tolerance for all bricks; leave out --picture-tolerance");
   refuse(args, {"resume"}, "a plan has nothing to resume; give it to build");
-  if (args.has("compare-filters"))
-    refuse(args, {"filter"}, "excludes --compare-filters, which has all of them");
   if (!args.has("ranks")) refuse(args, {"machines"}, "give --ranks with it");
   Wanted wanted = wanted_of(args);
   wanted.options.plan.estimate = true;
@@ -165,13 +160,7 @@ int plan_command(Arguments& args) {
   const std::optional<PictureForecast> forecast =
       picture_forecast(device, planned, wanted, progress.callback());
   const NoiseFound& found = planned.noise;
-  if (args.has("compare-filters") && !planned.noise.noise)
-    throw InputError(
-        fmt::format("--compare-filters: the scan's noise is not known: {}; state it by --photons or "
-                    "--sigma-p",
-                    planned.noise.why));
-  const std::optional<FieldNoise> noise =
-      noise_of_plan(device, planned, args.has("compare-filters") ? &wanted : nullptr, progress.callback());
+  const std::optional<FieldNoise> noise = noise_of_plan(device, planned, progress.callback());
   Json json = plan_json(planned, forecast);
   json["noise"] = noise_json(found);
   if (noise) json["noise"]["field"] = field_noise_json(*noise, planned.made.plan);

@@ -1,5 +1,5 @@
-// The recorded table of launch parameters. A row is what `vdvr bench tune` found fastest on a device of that
-// class.
+// The recorded table of launch parameters: of CPUs and of GPUs, the fastest candidate that
+// bench/back_project_bench timed (docs/performance.md, "How to measure").
 #include "host/base/opencl/column_tuning.hpp"
 
 namespace vdvr {
@@ -11,20 +11,8 @@ namespace {
 // An NVIDIA H200 (driver 580.159) makes 634 G updates a second with a column a work-item and groups of {32,
 // 4, 2}, 845 with this row, 870 with two vectors each.
 const ColumnTuning recorded[] = {
-    {.device_class = "cpu",
-     .lanes = 16,
-     .tile = 8,
-     .vectors = 2,
-     .tiles = 8,
-     .local = {1, 1, 1},
-     .product_columns = 2048},
-    {.device_class = "gpu",
-     .lanes = 1,
-     .tile = 8,
-     .vectors = 1,
-     .tiles = 1,
-     .local = {16, 4, 4},
-     .product_columns = 0},
+    {.lanes = 16, .tile = 8, .vectors = 2, .tiles = 8, .local = {1, 1, 1}, .product_columns = 2048},
+    {.lanes = 1, .tile = 8, .vectors = 1, .tiles = 1, .local = {16, 4, 4}, .product_columns = 0},
 };
 
 }  // namespace

@@ -4,15 +4,14 @@
 
 #include <array>
 #include <cstdint>
-#include <string>
 
 #include "vdvr/device.hpp"
 
 namespace vdvr {
 
-/// One row of the recorded table (host/base/opencl/column_tuning.cpp); `vdvr bench tune` measures candidates.
+/// One row of the recorded table (host/base/opencl/column_tuning.cpp); bench/back_project_bench times
+/// candidates.
 struct ColumnTuning {
-  std::string device_class = "cpu";
   int lanes = 16;   ///< samples of z per work-item: VDVR_LANES
   int tile = 8;     ///< columns of a back-projection's work-item: VDVR_TILE, 1 or 8
   int vectors = 1;  ///< of z per work-item of a back-projection: VDVR_VECTORS, 1 or 2

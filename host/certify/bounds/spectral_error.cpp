@@ -36,26 +36,20 @@ FilteredView strongest_view(Device& device, const ProjectionSet& scan, const Fie
 
 FrequencyAxis cosine_axis(std::int64_t n) { return {0, n, std::numbers::pi / static_cast<double>(n)}; }
 
-AmplitudeSum amplitude_sum(Device& device, const std::vector<float>& spectrum, const Index3& size, int rate) {
+double amplitude_sum(Device& device, const std::vector<float>& spectrum, const Index3& size, int rate) {
   constexpr std::int64_t slab_entries = std::int64_t{4} << 20;
   const std::int64_t plane = size[0] * size[1],
                      slab = std::clamp<std::int64_t>(slab_entries / plane, 1, size[2]);
-  AmplitudeSum sum;
-  sum.rate = rate;
+  double sum = 0;
   for (std::int64_t first = 0; first < size[2]; first += slab) {
     const std::int64_t planes = std::min(slab, size[2] - first);
     FrequencyAxis z = cosine_axis(size[2]);
     z.first = first;
     z.count = planes;
     const ErrorMap map = error_map(device, {cosine_axis(size[0]), cosine_axis(size[1]), z}, rate);
-    std::size_t i = 0, at = static_cast<std::size_t>(first * plane);
-    for (const std::size_t end = at + static_cast<std::size_t>(planes * plane); at < end; ++i, ++at) {
-      const double a = static_cast<double>(std::abs(spectrum[at]));
-      const double term = a * static_cast<double>(map.bound[i]);
-      sum.centre += a * static_cast<double>(map.centre[i]);
-      sum.bound += term;
-      sum.largest_term = std::max(sum.largest_term, term);
-    }
+    for (std::size_t i = 0; i < map.bound.size(); ++i)
+      sum += static_cast<double>(std::abs(spectrum[static_cast<std::size_t>(first * plane) + i])) *
+             static_cast<double>(map.bound[i]);
   }
   return sum;
 }

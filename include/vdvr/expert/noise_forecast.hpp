@@ -58,19 +58,6 @@ struct PlanInSigma {
 VDVR_API PlanInSigma make_plan_in_sigma(Device& device, const ProjectionSet& scan, double multiple,
                                         const ScanNoise& noise, const CertifyOptions& options = {},
                                         const Progress& progress = {});
-/// What the same tolerance stores with another ramp filter, and what noise that leaves in F.
-struct FilterForecast {
-  RampWindow filter = RampWindow::ram_lak;
-  double samples_ratio = 0;  ///< 0: the tolerance is out of reach
-  SigmaRange sigma;
-};
-/// Of all filters, the same epsilon, or with `multiple` as many sigmas of each. Cost: a plan of each. Throws
-/// what make_plan() throws but ToleranceError.
-VDVR_API std::vector<FilterForecast> forecast_filters(Device& device, const ProjectionSet& scan,
-                                                      const Tolerance& tolerance,
-                                                      std::optional<double> multiple, const ScanNoise& noise,
-                                                      const CertifyOptions& options = {},
-                                                      const Progress& progress = {});
 /// How build() holds each brick to `multiple` times its sigma.
 VDVR_API Refinement refinement_in_sigma(const BrickSigma& sigma, double multiple);
 /// What interpolation errs by on average: the root mean square of (V - F) / sigma over covered points between

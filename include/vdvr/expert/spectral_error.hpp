@@ -29,16 +29,10 @@ VDVR_API FilteredView strongest_view(Device& device, const ProjectionSet& scan, 
 /// The frequencies of cosine coefficients 0 .. n - 1 of n samples, in radians per sample.
 VDVR_API FrequencyAxis cosine_axis(std::int64_t n);
 
-/// Sums over all coefficients A of |A| times an error at spacing d / rate.
-struct AmplitudeSum {
-  int rate = 1;
-  double centre =
-      0;  ///< with 1 - prod cos: what the error would be with all waves peaking at one cell's centre
-  double bound = 0;         ///< with wave_error_bound: proved
-  double largest_term = 0;  ///< the largest |A| wave_error_bound
-};
-/// `spectrum` as cosine_spectrum leaves it. Cost: one map entry on the device per coefficient, in slabs.
-VDVR_API AmplitudeSum amplitude_sum(Device& device, const std::vector<float>& spectrum, const Index3& size,
-                                    int rate);
+/// The sum over all coefficients A of |A| times the proved error of a wave (wave_error_bound) at spacing d /
+/// rate. `spectrum`: cosine coefficients [z][y][x] under half-sample mirror extension. Cost: one map entry on
+/// the device per coefficient, in slabs.
+VDVR_API double amplitude_sum(Device& device, const std::vector<float>& spectrum, const Index3& size,
+                              int rate);
 
 }  // namespace vdvr
