@@ -52,6 +52,7 @@ Certificate fill_certificate(const Inputs& in, Device& device, const ProjectionS
       epsilon_abs == plan.epsilon_abs ? plan.epsilon : plan.epsilon * (epsilon_abs / plan.epsilon_abs);
   c.epsilon_abs = epsilon_abs;
   c.reference_range = plan.reference_range;
+  c.range_at = plan.range_at;
   const BrickMeasure* worst = nullptr;
   c.brick_totals.reserve(measured.bricks.size());
   for (const BrickMeasure& m : measured.bricks) {

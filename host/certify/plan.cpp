@@ -268,6 +268,8 @@ class Planner {
     if (range.not_covered == plan_.grid.sample_count() && plan_.grid.cells[2] > 1)
       throw InputError("no sample of the grid is covered by the scan; change `origin`, `size` or `center`");
     plan_.reference_range = range.high - range.low;
+    if (range.not_covered < plan_.grid.sample_count())
+      plan_.range_at = {plan_.base.grid.position(range.low_at), plan_.base.grid.position(range.high_at)};
   }
 
   // In units of the plan's own, the smallest.

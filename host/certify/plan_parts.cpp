@@ -11,6 +11,8 @@ Plan to_world(Plan plan, const Units& units) {
   scale(plan.base.samples, density);
   plan.epsilon_abs = to_world(plan.epsilon_abs, units);
   plan.reference_range = to_world(plan.reference_range, units);
+  if (plan.range_at)
+    for (Vec3& place : *plan.range_at) place = to_world(place, units);
   scale(plan.bounds, density);
   scale(plan.budget, density);
   return plan;

@@ -302,30 +302,35 @@ FlatsInTime flats_in_time(const fs::path& path, const io::RawScan& raw, const Sc
   }
 }
 
-enum class Wanted { all, flats_and_darks };
-
-// What comes from the files, and nothing kept.
-void read_frames(const fs::path& path, const ScanOptions& options, Wanted wanted) {
-  bool folder = false;
-  const io::RawScan raw = open_described(path, options, folder);
-  std::uint64_t bytes = 0;
-  for (const auto& stamp : stamps_of(raw)) bytes += stamp.first;
-  io::extend_child(bytes);
-  static_cast<void>(geometry_of(raw, path.string()));
-  require_room(raw, options, path.string());
-  const std::int64_t step = block_views(raw, options.max_memory_bytes);
-  std::vector<double> block(static_cast<std::size_t>(step * raw.rows * raw.columns));
-  std::vector<const io::Frames*> stacks{&raw.flats, &raw.darks};
-  if (wanted == Wanted::all) stacks.insert(stacks.begin(), &raw.projections);
-  for (const io::Frames* frames : stacks)
-    for (std::int64_t first = 0; first < frames->count; first += step)
-      frames->read(first, std::min(step, frames->count - first), block.data());
+// Throws what opening a damaged file would crash of.
+void try_to_open(const fs::path& path, const ScanOptions& options) {
+  if (!io::holds_hdf5(path)) return;
+  io::read_in_child(path, options.max_memory_bytes, [&] {
+    bool folder = false;
+    const io::RawScan raw = open_described(path, options, folder);
+    static_cast<void>(geometry_of(raw, path.string()));
+    require_room(raw, options, path.string());
+  });
 }
 
-// Throws what reading a damaged file would crash of.
-void try_to_read(const fs::path& path, const ScanOptions& options, Wanted wanted) {
-  if (io::holds_hdf5(path))
-    io::read_in_child(path, options.max_memory_bytes, [&] { read_frames(path, options, wanted); });
+// From here on a child reads the frames of HDF5.
+void read_frames_in_child(const fs::path& path, const ScanOptions& options, io::RawScan& raw) {
+  if (!io::holds_hdf5(path)) return;
+  std::uint64_t file_bytes = 0;
+  for (const auto& stamp : stamps_of(raw)) file_bytes += stamp.first;
+  const auto numbers = static_cast<std::uint64_t>(raw.rows * raw.columns);
+  const std::array<io::Frames*, 3> stacks{&raw.projections, &raw.flats, &raw.darks};
+  const auto reader = std::make_shared<io::FrameReader>(
+      path, options.max_memory_bytes, file_bytes, numbers,
+      static_cast<std::uint64_t>(block_views(raw, options.max_memory_bytes)) * numbers * sizeof(double),
+      [reads = std::array{stacks[0]->read, stacks[1]->read, stacks[2]->read}](const io::FrameBlock& block,
+                                                                              double* out) {
+        reads[static_cast<std::size_t>(block.stack)](block.first, block.frames, out);
+      });
+  for (std::size_t i = 0; i < stacks.size(); ++i)
+    stacks[i]->read = [reader, i](std::int64_t first, std::int64_t n, double* out) {
+      reader->read({static_cast<std::int64_t>(i), first, n}, out);
+    };
 }
 
 // Weights of a series depend on whether it is one, and where the axis is, its rows tell.
@@ -351,7 +356,7 @@ ProjectionSet read_series_of_half_acquisition(const fs::path& path, ScanOptions 
 
 ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const Progress& progress,
                          Understood& understood) {
-  try_to_read(path, options, Wanted::all);
+  try_to_open(path, options);
   bool folder = false;
   io::RawScan raw = open_described(path, options, folder);
   ProjectionSet scan;
@@ -363,10 +368,12 @@ ProjectionSet read_whole(const fs::path& path, const ScanOptions& options, const
   if (raw.cone) set_cone(path, raw, options, scan);
   io::set_shifts(raw, path.string(), scan.geometry);
   scan.report.notes.insert(scan.report.notes.begin(), raw.notes.begin(), raw.notes.end());
+  require_room(raw, options, path.string());
+  const auto before = stamps_of(raw);
+  read_frames_in_child(path, options, raw);
   FlatsInTime in_time = flats_in_time(path, raw, options);
   require_room(raw, options, path.string(), preparation.bytes(),
                in_time.bytes(block_views(raw, options.max_memory_bytes)));
-  const auto before = stamps_of(raw);
   io::ValueTotals totals;
   read_samples(raw, options, preparation, in_time, scan, totals, understood, progress);
   const std::int64_t samples = scan.size();
@@ -415,10 +422,11 @@ ProjectionSet read_scan(const fs::path& path, const ScanOptions& options, const 
 }
 
 std::optional<LineIntegralNoise> read_line_noise(const fs::path& path, const ScanOptions& options) {
-  try_to_read(path, options, Wanted::flats_and_darks);
+  try_to_open(path, options);
   bool folder = false;
-  const io::RawScan raw = open_described(path, options, folder);
+  io::RawScan raw = open_described(path, options, folder);
   if (!raw.counts) return std::nullopt;
+  read_frames_in_child(path, options, raw);
   std::optional<LineIntegralNoise> noise =
       photon_transfer(raw.flats, raw.darks, raw.rows, raw.columns, runs_of_flats(raw));
   if (noise) noise = binned(*noise, raw.rows, raw.columns, options.preparation.binning);

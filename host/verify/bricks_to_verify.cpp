@@ -47,14 +47,15 @@ class Sample {
     for (std::int64_t z = 0; z < n[2]; ++z) add(at(z * n[0] * n[1] + column));
   }
 
-  /// Bricks that may be chosen, by level.
-  [[nodiscard]] std::map<LevelTriple, std::vector<std::size_t>> by_level(
-      std::span<const std::int64_t> layers) const {
-    const Index3 n = volume_.bricks();
+  [[nodiscard]] const std::vector<std::uint8_t>& allowed() const { return allowed_; }
+  [[nodiscard]] std::size_t chosen() const { return at(std::count(chosen_.begin(), chosen_.end(), 1)); }
+
+  /// Bricks that may be chosen among these, by level.
+  template <class Bricks>
+  [[nodiscard]] std::map<LevelTriple, std::vector<std::size_t>> by_level(const Bricks& bricks) const {
     std::map<LevelTriple, std::vector<std::size_t>> out;
-    for (const std::int64_t z : layers)
-      for (std::int64_t i = z * n[0] * n[1]; i < (z + 1) * n[0] * n[1]; ++i)
-        if (allowed_[at(i)]) out[volume_.level[at(i)]].push_back(at(i));
+    for (const std::size_t i : bricks)
+      if (allowed_[i]) out[volume_.level[i]].push_back(i);
     return out;
   }
 
@@ -69,9 +70,16 @@ class Sample {
   std::vector<std::uint8_t> allowed_, chosen_;
 };
 
-void add_of_layers(Sample& sample, std::span<const std::int64_t> layers, double fraction,
+std::vector<std::size_t> bricks_of(std::span<const std::int64_t> layers, const Index3& n) {
+  std::vector<std::size_t> out;
+  for (const std::int64_t z : layers)
+    for (std::int64_t i = z * n[0] * n[1]; i < (z + 1) * n[0] * n[1]; ++i) out.push_back(at(i));
+  return out;
+}
+
+void add_of_layers(Sample& sample, const Index3& n, std::span<const std::int64_t> layers, double fraction,
                    std::mt19937& random) {
-  for (auto& [level, members] : sample.by_level(layers)) {
+  for (auto& [level, members] : sample.by_level(bricks_of(layers, n))) {
     std::shuffle(members.begin(), members.end(), random);
     for (const std::size_t i : std::span(members).first(share_of(fraction, members.size()))) sample.add(i);
   }
@@ -79,17 +87,76 @@ void add_of_layers(Sample& sample, std::span<const std::int64_t> layers, double 
 
 // A level is as frequent in the columns as it is in the volume, but for rare ones.
 void add_columns(Sample& sample, const Index3& n, double fraction, std::mt19937& random) {
-  std::vector<std::int64_t> columns(at(n[0] * n[1])), layers(at(n[2]));
+  std::vector<std::int64_t> columns(at(n[0] * n[1]));
+  std::vector<std::size_t> bricks(at(n[0] * n[1] * n[2]));
   std::iota(columns.begin(), columns.end(), 0);
-  std::iota(layers.begin(), layers.end(), 0);
+  std::iota(bricks.begin(), bricks.end(), 0);
   std::shuffle(columns.begin(), columns.end(), random);
   for (const std::int64_t c : std::span(columns).first(share_of(fraction, columns.size())))
     sample.add_column(c);
-  for (auto& [level, members] : sample.by_level(layers)) {
+  for (auto& [level, members] : sample.by_level(bricks)) {
     std::shuffle(members.begin(), members.end(), random);
     const std::size_t wanted = std::min(members.size(), least_of_level);
     for (std::size_t i = 0; i < members.size() && sample.chosen_of(members) < wanted; ++i)
       sample.add_column(static_cast<std::int64_t>(members[i]) % (n[0] * n[1]));
+  }
+}
+
+// A cube of bricks, cut to the grid.
+std::vector<std::size_t> cube(const Index3& n, const Index3& first, std::int64_t side) {
+  std::vector<std::size_t> out;
+  for (std::int64_t z = first[2]; z < std::min(n[2], first[2] + side); ++z)
+    for (std::int64_t y = first[1]; y < std::min(n[1], first[1] + side); ++y)
+      for (std::int64_t x = first[0]; x < std::min(n[0], first[0] + side); ++x)
+        out.push_back(at((z * n[1] + y) * n[0] + x));
+  return out;
+}
+
+// Where cubes of that side begin that fill a box.
+std::vector<Index3> cubes(const Index3& begin, const Index3& end, std::int64_t side) {
+  std::vector<Index3> out;
+  for (std::int64_t z = begin[2]; z < end[2]; z += side)
+    for (std::int64_t y = begin[1]; y < end[1]; y += side)
+      for (std::int64_t x = begin[0]; x < end[0]; x += side) out.push_back({x, y, z});
+  return out;
+}
+
+// Blocks with six times as many bricks as are wanted, four at least, the worst brick's among them; of these
+// whole parts, and of each level its least number.
+void add_of_blocks(Sample& sample, const Index3& n, const VerifyOptions& options, const Index3& worst,
+                   std::mt19937& random) {
+  constexpr std::size_t fewest_blocks = 4, of_blocks = 6;
+  const auto all = at(std::count(sample.allowed().begin(), sample.allowed().end(), 1));
+  const std::size_t wanted = std::min(options.most_of_cone, share_of(options.fraction, all));
+  std::vector<Index3> blocks = cubes({0, 0, 0}, n, bricks_of_block), parts;
+  std::shuffle(blocks.begin(), blocks.end(), random);
+  Index3 of_worst = worst;
+  for (std::int64_t& first : of_worst) first -= first % bricks_of_block;
+  std::iter_swap(blocks.begin(), std::find(blocks.begin(), blocks.end(), of_worst));
+  std::vector<std::size_t> pool;
+  std::size_t taken = 0, may_be = 0;
+  for (const Index3& first : blocks) {
+    if (taken >= fewest_blocks && may_be >= of_blocks * wanted) break;
+    const std::vector<std::size_t> members = cube(n, first, bricks_of_block);
+    const auto here = std::count_if(members.begin(), members.end(),
+                                    [&](std::size_t i) { return sample.allowed()[i] != 0; });
+    if (here == 0) continue;
+    ++taken;
+    may_be += at(here);
+    pool.insert(pool.end(), members.begin(), members.end());
+    Index3 end = first;
+    for (std::size_t a = 0; a < 3; ++a) end[a] = std::min(n[a], end[a] + bricks_of_block);
+    const std::vector<Index3> of_block = cubes(first, end, bricks_of_part);
+    parts.insert(parts.end(), of_block.begin(), of_block.end());
+  }
+  std::shuffle(parts.begin(), parts.end(), random);
+  for (std::size_t i = 0; i < parts.size() && sample.chosen() < wanted; ++i)
+    for (const std::size_t brick : cube(n, parts[i], bricks_of_part)) sample.add(brick);
+  for (auto& [level, members] : sample.by_level(pool)) {
+    std::shuffle(members.begin(), members.end(), random);
+    const std::size_t least = std::min(members.size(), least_of_level);
+    for (std::size_t i = 0; i < members.size() && sample.chosen_of(members) < least; ++i)
+      sample.add(members[i]);
   }
 }
 
@@ -100,15 +167,16 @@ std::vector<std::uint8_t> all_bricks(const MixedVolume& volume, const Certificat
 }
 
 std::vector<std::uint8_t> sample_of_bricks(const MixedVolume& volume, const Certificate& stored,
-                                           const VerifyOptions& options, bool all_heights) {
+                                           const VerifyOptions& options, SampleOf shape,
+                                           std::vector<std::uint8_t> allowed) {
   const Index3 n = volume.bricks(), worst = brick_at(volume, stored.worst_at);
   std::mt19937 random(options.seed);
-  Sample sample(volume, all_bricks(volume, stored));
-  if (all_heights) {
-    add_columns(sample, n, options.fraction, random);
-  } else {
+  Sample sample(volume, std::move(allowed));
+  if (shape == SampleOf::columns) add_columns(sample, n, options.fraction, random);
+  if (shape == SampleOf::blocks) add_of_blocks(sample, n, options, worst, random);
+  if (shape == SampleOf::layers) {
     const std::vector<std::int64_t> layers = layers_to_sample(n[2], worst[2], random);
-    add_of_layers(sample, layers,
+    add_of_layers(sample, n, layers,
                   options.fraction * static_cast<double>(n[2]) / static_cast<double>(layers.size()), random);
   }
   sample.add(at((worst[2] * n[1] + worst[1]) * n[0] + worst[0]));

@@ -364,9 +364,13 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
   result.epsilon_abs = stored.epsilon_abs;
   result.bricks = static_cast<std::int64_t>(volume.level.size());
   VerifyField field(state, exact, volume, stored.window, progress, units_of(scan).density());
-  const std::vector<std::uint8_t> selected =
-      options.exhaustive ? all_bricks(volume, stored)
-                         : sample_of_bricks(volume, stored, options, field.rows_serve(layers_of_sample));
+  const SampleOf shape = field.nodes_are_dear()               ? SampleOf::blocks
+                         : field.rows_serve(layers_of_sample) ? SampleOf::columns
+                                                              : SampleOf::layers;
+  std::vector<std::uint8_t> selected = all_bricks(volume, stored);
+  // A block in a corner of the grid, where nothing is covered, would be none.
+  if (shape == SampleOf::blocks) selected = field.near_coverage(std::move(selected));
+  if (!options.exhaustive) selected = sample_of_bricks(volume, stored, options, shape, std::move(selected));
   const FieldPoints points_of_field(exact, region, volume, selected, options.seed);
   field.look_at(points_of_field.bricks(), points_of_field.nodes_each(), options.seed);
   TestedBricks tested(field, volume, attack,

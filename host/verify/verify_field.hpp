@@ -66,6 +66,8 @@ class VerifyField {
   /// Of parallel beam, whether the detector's rows are no more than what so many layers of bricks take of
   /// heights: then they are made, and serve all layers.
   [[nodiscard]] bool rows_serve(std::int64_t layers) const;
+  /// Of these bricks those that can hold a tested cell.
+  [[nodiscard]] std::vector<std::uint8_t> near_coverage(std::vector<std::uint8_t> selected) const;
   /// The least rate of gold on whose cells the brick is trilinear.
   [[nodiscard]] int least_rate(std::size_t brick) const;
 
@@ -98,7 +100,6 @@ class VerifyField {
   struct Shape;
   struct Batch;
   struct Slab;
-  [[nodiscard]] std::vector<std::uint8_t> near_coverage(std::vector<std::uint8_t> selected) const;
   struct Part;
   [[nodiscard]] std::vector<Part> parts_of(const std::vector<std::uint8_t>& selected,
                                            std::span<const int> rates) const;

@@ -196,6 +196,8 @@ void read_promise(const Member& m, Certificate& c) {
   c.epsilon = m.at("epsilon").number();
   c.epsilon_abs = m.at("epsilon_abs").number();
   c.reference_range = m.at("reference_range").number();
+  if (m.has("range_at"))
+    c.range_at = {m.at("range_at").at("low").numbers<3>(), m.at("range_at").at("high").numbers<3>()};
   if (m.has("sealed")) c.sealed = m.at("sealed").flag();
   if (m.has("comparison")) c.comparison = m.at("comparison").flag();
   // A record of a comparison promises nothing; those of earlier versions said so in these two.
@@ -391,6 +393,9 @@ std::string to_json(const Certificate& c) {
   j["epsilon"] = finite("epsilon", c.epsilon);
   j["epsilon_abs"] = finite("epsilon_abs", c.epsilon_abs);
   j["reference_range"] = finite("reference_range", c.reference_range);
+  if (c.range_at)
+    j["range_at"] = {{"low", numbers("range_at.low", (*c.range_at)[0])},
+                     {"high", numbers("range_at.high", (*c.range_at)[1])}};
   if (c.sealed) j["sealed"] = true;
   if (c.comparison) j["comparison"] = true;
   if (!c.comparison) {

@@ -52,6 +52,8 @@ Certificate to_world(Certificate c, const Units& units) {
   c.holds_buffer = c.holds_buffer && c.total_buffer <= c.epsilon_abs;
   if (c.total_image3d) c.holds_image3d = c.holds_image3d.value_or(false) && *c.total_image3d <= c.epsilon_abs;
   c.worst_at = to_world(c.worst_at, units);
+  if (c.range_at)
+    for (Vec3& place : *c.range_at) place = to_world(place, units);
   if (c.window) c.window = {to_world(c.window->first, units), to_world(c.window->second, units)};
   if (c.roi) c.roi = to_world(*c.roi, units);
   return c;

@@ -35,6 +35,17 @@ static inline __attribute__((always_inline)) float8 taps(float g) {
              VDVR_SIX_FUSED_HORNER(float8, s, EVEN_OF(FIRST_OF), EVEN_OF(SECOND_OF), EVEN_OF(THIRD_OF)));
 }
 
+// Of two places, each of which fills one half of `g`.
+#define TWICE(taps) (float16)(taps, taps)
+static inline __attribute__((always_inline)) float16 taps_of_two(float16 g) {
+  const float16 s = g * g;
+  return fma(g,
+             VDVR_SIX_FUSED_HORNER(float16, s, TWICE(ODD_OF(FIRST_OF)), TWICE(ODD_OF(SECOND_OF)),
+                                   TWICE(ODD_OF(THIRD_OF))),
+             VDVR_SIX_FUSED_HORNER(float16, s, TWICE(EVEN_OF(FIRST_OF)), TWICE(EVEN_OF(SECOND_OF)),
+                                   TWICE(EVEN_OF(THIRD_OF))));
+}
+
 static inline __attribute__((always_inline)) float sum_of(float8 v) {
   const float4 four = v.lo + v.hi;
   const float2 two = four.lo + four.hi;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <boost/test/unit_test.hpp>
 #include <cmath>
+#include <iterator>
 #include <random>
 #include <string>
 
@@ -133,7 +134,8 @@ Nodes nodes_of(Chain& chain, const Coverage& coverage, const Vec3& spacing, bool
   values.fill(0.0f);
   out.first = {-0.4 * side * spacing[0], -0.6 * side * spacing[1]};
   ConePage page{&values, {out.first}, {}};
-  for (std::int32_t y = 0; y < side; ++y) page.wanted.push_back({y % 3, to_int(side) - 1 - y % 2});
+  for (std::int32_t y = 0; y < side; ++y)
+    page.wanted.push_back({y % 3, to_int(side) - 1 - y % 2, 0, INT32_MAX});
   tiles.back_project(std::span(&page, 1), {});
   out.values = values.to_host();
   const ConeTiles::Errors e = tiles.errors();
@@ -201,6 +203,54 @@ BOOST_AUTO_TEST_CASE(gold_of_cone_beam_is_within_its_errors_of_the_field) {
   }
   BOOST_TEST(beyond > 500);
   BOOST_TEST_MESSAGE("closest " << closest);
+}
+
+// For some places: what boxes read, again and again from tiles that hold some of it, is what whole tiles
+// hold.
+BOOST_AUTO_TEST_CASE(nodes_made_for_some_boxes_are_those_of_whole_tiles) {
+  for (const bool tilted : {false, true}) {
+    ConeShape shape = orbit(60, 40, 48);
+    if (tilted) shape.out_of_plane_deg = 3;
+    const ProjectionSet scan = noisy_cone(shape, 11);
+    const Chain chain(scan);
+    const Grid grid = grid_of(Coverage(chain.filtered.geometry, chain.filtered.views), 1);
+    KeptGold whole(device().state(), chain.filtered, chain.sups, grid, 2, 8, Interpolation::six_taps),
+        sparing(device().state(), chain.filtered, chain.sups, grid, 2, 8, Interpolation::six_taps);
+    sparing.make_only_what_is_read();
+    const GoldLattice fine = whole.lattice(grid, 4), coarse = whole.lattice(grid, 2);
+    const auto is_alike = [&](const GoldLattice& lattice, const GoldBox& box) {
+      const std::int64_t stride = column_stride(box.nodes[2]);
+      std::array<std::vector<float>, 2> found;
+      for (std::size_t i = 0; i < 2; ++i) {
+        KeptGold& kept = i == 0 ? whole : sparing;
+        kept.prepare(lattice, {box}, {});
+        const opencl::DeviceArray<float> out(device().state(), count(box.nodes[0] * box.nodes[1] * stride),
+                                             "gold");
+        kept.fill(lattice, box, out, 0, stride);
+        const std::vector<float> all = out.to_host();
+        for (std::int64_t column = 0; column < box.nodes[0] * box.nodes[1]; ++column)
+          std::copy_n(all.begin() + column * stride, box.nodes[2], std::back_inserter(found[i]));
+      }
+      return found[0] == found[1] && *std::ranges::max_element(found[0]) > 0;
+    };
+    const std::int64_t middle = 4 * grid.cells[0] / 2, high = 4 * grid.cells[2] / 2;
+    const GoldBox first{{middle, middle, high}, {17, 9, 17}}, above{{middle, middle, high + 40}, {17, 9, 17}},
+        beside{{middle - 20, middle + 3, high - 30}, {30, 20, 9}},
+        of_coarse{{middle / 2 - 30, middle / 2 - 9, high / 2 - 7}, {9, 9, 20}};
+    sparing.will_read(coarse, {of_coarse});
+    BOOST_TEST(is_alike(fine, first));
+    double seconds = sparing.prepare_seconds();
+    BOOST_TEST(is_alike(coarse, of_coarse));
+    BOOST_TEST(is_alike(fine, first));
+    BOOST_TEST(sparing.prepare_seconds() == seconds);  // it was all there
+    BOOST_TEST(is_alike(fine, above));
+    BOOST_TEST(is_alike(fine, beside));
+    BOOST_TEST(sparing.prepare_seconds() > seconds);
+    seconds = sparing.prepare_seconds();
+    for (const GoldBox& box : {first, above, beside}) BOOST_TEST(is_alike(fine, box));
+    BOOST_TEST(is_alike(coarse, of_coarse));
+    BOOST_TEST(sparing.prepare_seconds() == seconds);
+  }
 }
 
 }  // namespace

@@ -173,6 +173,37 @@ BOOST_AUTO_TEST_CASE(the_sample_of_bricks_finds_what_is_wrong_with_all) {
   BOOST_TEST(finds(c, "the arithmetic term is 0", false));
 }
 
+// A sample rests on where the file says that F is smallest and largest; files from before make the base
+// again.
+BOOST_AUTO_TEST_CASE(a_range_is_compared_where_it_is_attained) {
+  const Certificate& right = made().certificate;
+  BOOST_REQUIRE(right.range_at.has_value());
+  Certificate c = right;
+  c.range_at.reset();
+  for (const bool exhaustive : {false, true}) BOOST_TEST(verdict(c, exhaustive) == "holds");
+  for (const bool with_places : {true, false})
+    for (const double factor : {1.01, 0.99}) {
+      c = right;
+      if (!with_places) c.range_at.reset();
+      c.reference_range *= factor;
+      c.epsilon /= factor;
+      for (const bool exhaustive : {false, true}) BOOST_TEST(finds(c, "reference_range", exhaustive));
+    }
+  const Vec3 spacing = made().volume.grid.spacing;
+  for (const bool exhaustive : {false, true})
+    for (const std::size_t which : {0u, 1u}) {
+      c = right;
+      (*c.range_at)[which][0] += 0.5 * spacing[0];
+      BOOST_TEST(finds(c, "range_at", exhaustive));
+      c = right;
+      (*c.range_at)[which] = made().volume.grid.origin;  // a corner, which no view sees
+      BOOST_TEST(finds(c, "range_at", exhaustive));
+      c = right;
+      (*c.range_at)[which] = (*c.range_at)[1 - which];
+      BOOST_TEST(finds(c, "reference_range", exhaustive));
+    }
+}
+
 BOOST_AUTO_TEST_CASE(every_total_of_a_brick_that_was_lowered_is_found) {
   const Certificate& right = made().certificate;
   for (std::size_t i = 0; i < right.brick_totals.size(); ++i) {

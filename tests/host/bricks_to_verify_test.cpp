@@ -3,6 +3,7 @@
 #include "host/verify/bricks_to_verify.hpp"
 
 #include <algorithm>
+#include <array>
 #include <boost/test/unit_test.hpp>
 #include <map>
 #include <random>
@@ -51,7 +52,8 @@ std::map<LevelTriple, std::size_t> by_level(const MixedVolume& volume,
 BOOST_AUTO_TEST_CASE(columns_are_whole_and_every_level_is_among_them) {
   for (unsigned seed = 1; seed <= 40; ++seed) {
     const Case c = make_case(seed);
-    const auto sample = sample_of_bricks(c.volume, c.stored, {false, 0.05, seed}, true);
+    const auto sample = sample_of_bricks(c.volume, c.stored, {false, 0.05, seed}, SampleOf::columns,
+                                         all_bricks(c.volume, c.stored));
     BOOST_TEST(sample[c.worst] == 1);
     std::size_t whole = 0;
     for (std::int64_t column = 0; column < nx * ny; ++column) {
@@ -74,7 +76,8 @@ BOOST_AUTO_TEST_CASE(columns_are_whole_and_every_level_is_among_them) {
 BOOST_AUTO_TEST_CASE(layers_are_few_and_every_level_in_them_is_tested) {
   for (unsigned seed = 1; seed <= 40; ++seed) {
     const Case c = make_case(seed);
-    const auto sample = sample_of_bricks(c.volume, c.stored, {false, 0.05, seed}, false);
+    const auto sample = sample_of_bricks(c.volume, c.stored, {false, 0.05, seed}, SampleOf::layers,
+                                         all_bricks(c.volume, c.stored));
     BOOST_TEST(sample[c.worst] == 1);
     std::set<std::int64_t> layers;
     for (std::size_t i = 0; i < sample.size(); ++i)
@@ -94,11 +97,64 @@ BOOST_AUTO_TEST_CASE(layers_are_few_and_every_level_in_them_is_tested) {
   }
 }
 
+BOOST_AUTO_TEST_CASE(blocks_are_few_and_every_level_in_them_is_tested) {
+  const auto block_of = [](std::size_t i) {
+    const auto brick = static_cast<std::int64_t>(i);
+    return std::array{brick % nx / bricks_of_block, brick / nx % ny / bricks_of_block,
+                      brick / (nx * ny) / bricks_of_block};
+  };
+  for (unsigned seed = 1; seed <= 40; ++seed) {
+    const Case c = make_case(seed);
+    const auto sample = sample_of_bricks(c.volume, c.stored, {false, 0.05, seed}, SampleOf::blocks,
+                                         all_bricks(c.volume, c.stored));
+    BOOST_TEST(sample[c.worst] == 1);
+    std::set<std::array<std::int64_t, 3>> blocks;
+    for (std::size_t i = 0; i < sample.size(); ++i)
+      if (sample[i] != 0) blocks.insert(block_of(i));
+    // Four at least are drawn from, half of all at most; a part has 64 bricks at most.
+    BOOST_TEST((blocks.size() >= 2 && blocks.size() <= 8));
+    const auto chosen = std::count(sample.begin(), sample.end(), 1);
+    BOOST_TEST((chosen >= nx * ny * nz / 20 && chosen <= nx * ny * nz / 20 + 64 + 3 * 8 + 1));
+    auto in_blocks = all_bricks(c.volume, c.stored);
+    for (std::size_t i = 0; i < in_blocks.size(); ++i)
+      if (!blocks.contains(block_of(i))) in_blocks[i] = 0;
+    const auto all = by_level(c.volume, in_blocks), some = by_level(c.volume, sample);
+    for (const auto& [level, members] : all) {
+      const auto found = some.find(level);
+      BOOST_TEST((found != some.end() && found->second >= std::min<std::size_t>(8, members)));
+    }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(blocks_lie_where_bricks_may_be_chosen) {
+  const Case c = make_case(3);
+  auto corner = all_bricks(c.volume, c.stored);
+  std::size_t left = 0;
+  for (std::size_t i = 0; i < corner.size(); ++i) {
+    const auto brick = static_cast<std::int64_t>(i);
+    if (brick % nx >= 5 || brick / nx % ny >= 5) corner[i] = 0;
+    left += corner[i];
+  }
+  const auto sample = sample_of_bricks(c.volume, c.stored, {false, 0.5, 3}, SampleOf::blocks, corner);
+  for (std::size_t i = 0; i < sample.size(); ++i) BOOST_TEST(sample[i] <= corner[i]);
+  BOOST_TEST(2 * std::count(sample.begin(), sample.end(), 1) >= left);
+}
+
+BOOST_AUTO_TEST_CASE(a_sample_of_blocks_has_a_limit) {
+  const Case c = make_case(5);
+  VerifyOptions options{false, 0.5, 5};
+  options.most_of_cone = 100;
+  const auto sample =
+      sample_of_bricks(c.volume, c.stored, options, SampleOf::blocks, all_bricks(c.volume, c.stored));
+  const auto chosen = std::count(sample.begin(), sample.end(), 1);
+  BOOST_TEST((chosen >= 100 && chosen <= 100 + 64 + 3 * 8 + 1));
+}
+
 BOOST_AUTO_TEST_CASE(seeds_give_samples_of_their_own_and_the_region_is_kept_to) {
   Case c = make_case(7);
-  for (const bool columns : {false, true}) {
+  for (const SampleOf shape : {SampleOf::columns, SampleOf::layers, SampleOf::blocks}) {
     const auto sample = [&](unsigned seed) {
-      return sample_of_bricks(c.volume, c.stored, {false, 0.05, seed}, columns);
+      return sample_of_bricks(c.volume, c.stored, {false, 0.05, seed}, shape, all_bricks(c.volume, c.stored));
     };
     BOOST_TEST((sample(3) == sample(3)));
     BOOST_TEST((sample(3) != sample(4)));

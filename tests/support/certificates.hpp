@@ -10,6 +10,7 @@ inline Certificate full_certificate() {
   c.epsilon = 0.03;
   c.epsilon_abs = 0.03 * 1.126;
   c.reference_range = 1.126;
+  c.range_at = {Vec3{0.1, -2.0 / 3, 5}, Vec3{-7, 1e-9, 3.3}};
   c.holds_buffer = true;
   c.holds_image3d = true;
   c.total_buffer = 1.0 / 3;

@@ -147,6 +147,12 @@ void GoldStream::prepare(const std::vector<std::uint8_t>& selected, For purpose,
   source_->kept.prepare(lattice_, boxes(partition(selected)), progress);
 }
 
+void GoldStream::will_measure(const std::vector<std::uint8_t>& selected) {
+  begin(For::measuring);
+  source_->kept.will_read(lattice_, boxes(partition(selected)));
+  if (!settings_.base_only) source_->remainder->will_require(selected);
+}
+
 void GoldStream::run(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch,
                      const Progress& progress, const std::string& stage, For purpose) {
   run_works(works(selected, purpose), selected, on_batch, progress, stage, purpose);

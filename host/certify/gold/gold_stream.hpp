@@ -102,6 +102,8 @@ class GoldStream {
   [[nodiscard]] Index3 block_bricks() const { return {block_bricks_, block_bricks_, slab_bricks_}; }
   /// Keeps what `run` would need to keep for these bricks.
   void prepare(const std::vector<std::uint8_t>& selected, For purpose, const Progress& progress);
+  /// KeptGold::will_read of what measuring these bricks reads.
+  void will_measure(const std::vector<std::uint8_t>& selected);
   /// Samples that `run` would compute for these bricks, and tiles of kept gold that it would add.
   [[nodiscard]] double samples(const std::vector<std::uint8_t>& selected, For purpose);
   [[nodiscard]] std::int64_t missing_tiles(const std::vector<std::uint8_t>& selected, For purpose);

@@ -185,10 +185,18 @@ void BrickRemainder::require(const std::vector<std::uint8_t>& selected, const Pr
   look_at(open(selected), progress);
 }
 
+std::vector<GoldBox> BrickRemainder::boxes(std::span<const Block> blocks) const {
+  std::vector<GoldBox> out;
+  for (const Block& block : blocks) out.push_back(box_of(block.first, block.bricks));
+  return out;
+}
+
+void BrickRemainder::will_require(const std::vector<std::uint8_t>& selected) {
+  kept_.will_read(nodes_, boxes(open(selected)));
+}
+
 void BrickRemainder::look_at(std::span<const Block> blocks, const Progress& progress) {
-  std::vector<GoldBox> boxes;
-  for (const Block& block : blocks) boxes.push_back(box_of(block.first, block.bricks));
-  kept_.prepare(nodes_, boxes, progress);
+  kept_.prepare(nodes_, boxes(blocks), progress);
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     look_at(blocks[i].first, blocks[i].bricks);
     report(progress, "remainder", static_cast<double>(i + 1) / static_cast<double>(blocks.size()));

@@ -28,6 +28,8 @@ class BrickRemainder {
   /// Looks at the bricks selected[(z * bricks_y + y) * bricks_x + x] and what their stencils reach, as far as
   /// nobody has. Cost: gold at the rate of the differences, and six of these a node.
   void require(const std::vector<std::uint8_t>& selected, const Progress& progress);
+  /// KeptGold::will_read of what that reads.
+  void will_require(const std::vector<std::uint8_t>& selected);
 
   /// Bricks that are looked at together, some around the grid included.
   struct Block {
@@ -59,6 +61,7 @@ class BrickRemainder {
   [[nodiscard]] Maxima addends_of(const Index3& first, const Index3& bricks) const;
   [[nodiscard]] std::size_t slot(const Index3& position) const;
   [[nodiscard]] GoldBox box_of(const Index3& first, const Index3& bricks) const;
+  [[nodiscard]] std::vector<GoldBox> boxes(std::span<const Block> blocks) const;
   void look_at(const Index3& first, const Index3& bricks);
   template <class Visit>
   void for_each_block(Visit&& visit) const;

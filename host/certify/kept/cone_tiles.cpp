@@ -270,12 +270,14 @@ void ConeTiles::launch(const Table& table, const ConePage& page, VdvrConeNodes s
         numbers[at(i * table.views + k)] =
             numbers_about<Real>(scan_.views[at(table.first + k)], place, h, columns_, rows_);
     });
-    std::vector<cl_int2> wanted;
-    for (std::size_t i = first * at(side); i < (first + n) * at(side); ++i)
-      wanted.push_back({{page.wanted[i][0], page.wanted[i][1]}});
+    std::vector<cl_int4> wanted;
+    for (std::size_t i = first * at(side); i < (first + n) * at(side); ++i) {
+      const auto& [left, right, low, end] = page.wanted[i];
+      wanted.push_back({{left, right, low, end}});
+    }
     const opencl::DeviceArray<ViewNumbers<Real>> views(state_, std::span<const ViewNumbers<Real>>(numbers),
                                                        "views about blocks");
-    const opencl::DeviceArray<cl_int2> ranges(state_, std::span<const cl_int2>(wanted), "wanted columns");
+    const opencl::DeviceArray<cl_int4> ranges(state_, std::span<const cl_int4>(wanted), "wanted columns");
     shape.tiles = to_int(static_cast<std::int64_t>(n));
     // On a CPU neighbours in y, which read the same columns and rows, follow one another.
     kernel(opencl::in_groups(state_.info, {items[0], items[1], n}, {1, 1, 1}, 1), page.out->buffer(),

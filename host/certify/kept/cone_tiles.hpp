@@ -40,8 +40,10 @@ struct ConeLattice {
 /// Tiles of 32 x 32 columns of nodes on the device, one after another: float [tile][y][x][stride].
 struct ConePage {
   const opencl::DeviceArray<float>* out = nullptr;
-  std::vector<std::array<double, 2>> first;         ///< of each tile, where its first column stands
-  std::vector<std::array<std::int32_t, 2>> wanted;  ///< [tile][y]: first and last column
+  std::vector<std::array<double, 2>> first;  ///< of each tile, where its first column stands
+  /// [tile][y]: first and last column, and the heights, from the lowest on and alike in all of a tile: the
+  /// first and the one after the last. Others may be left out.
+  std::vector<std::array<std::int32_t, 4>> wanted;
 };
 
 [[nodiscard]] InputError source_too_close(std::size_t view);

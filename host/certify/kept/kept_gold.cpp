@@ -227,16 +227,75 @@ bool KeptGold::is_kept(const TileAt& tile) const {
   return true;
 }
 
-std::vector<KeptGold::TileAt> KeptGold::new_tiles(const GoldLattice& lattice,
-                                                  const std::vector<GoldBox>& boxes) const {
-  std::set<TileAt> out;
+void KeptGold::PartOfTile::add(const PartOfTile& other) {
+  for (std::size_t a = 0; a < 3; ++a) {
+    low[a] = std::min(low[a], other.low[a]);
+    end[a] = std::max(end[a], other.end[a]);
+  }
+}
+
+bool KeptGold::PartOfTile::holds(const PartOfTile& other) const {
+  for (std::size_t a = 0; a < 3; ++a)
+    if (other.low[a] < low[a] || other.end[a] > end[a]) return false;
+  return true;
+}
+
+// Of cone beam the heights too.
+KeptGold::PartsOfTiles KeptGold::read_by(const GoldLattice& lattice,
+                                         const std::vector<GoldBox>& boxes) const {
+  PartsOfTiles out;
   for (const GoldBox& box : boxes) {
     const Span x = span(lattice, 0, box), y = span(lattice, 1, box);
+    PartOfTile part;
+    if (cone_) {
+      const Span z = heights_span(lattice, box);
+      part.low[2] = z.low - run_->low;
+      part.end[2] = part.low[2] + z.count;
+    }
     for (std::int64_t ty = floor_div(y.low, side); ty * side < y.low + y.count; ++ty)
-      for (std::int64_t tx = floor_div(x.low, side); tx * side < x.low + x.count; ++tx)
-        if (!tiles_.contains({ty, tx}) && is_kept({ty, tx})) out.insert({ty, tx});
+      for (std::int64_t tx = floor_div(x.low, side); tx * side < x.low + x.count; ++tx) {
+        if (!is_kept({ty, tx})) continue;
+        part.low[0] = std::max<std::int64_t>(0, x.low - tx * side);
+        part.low[1] = std::max<std::int64_t>(0, y.low - ty * side);
+        part.end[0] = std::min(side, x.low + x.count - tx * side);
+        part.end[1] = std::min(side, y.low + y.count - ty * side);
+        out[{ty, tx}].add(part);
+      }
   }
-  return {out.begin(), out.end()};
+  return out;
+}
+
+std::vector<KeptGold::TileAt> KeptGold::new_tiles(const GoldLattice& lattice,
+                                                  const std::vector<GoldBox>& boxes) const {
+  std::vector<TileAt> out;
+  for (const auto& [tile, part] : read_by(lattice, boxes))
+    if (!tiles_.contains(tile)) out.push_back(tile);
+  return out;
+}
+
+void KeptGold::will_read(const GoldLattice& lattice, const std::vector<GoldBox>& boxes) {
+  if (!sparing_) return;
+  for (const auto& [tile, part] : read_by(lattice, boxes)) to_be_read_[tile].add(part);
+}
+
+// Those of which something is missing, with all of them that was made and will be read: a tile is made anew
+// in another place.
+std::vector<KeptGold::TileAt> KeptGold::sparing_tiles(const GoldLattice& lattice,
+                                                      const std::vector<GoldBox>& boxes) {
+  const auto is_made = [&](const PartsOfTiles::value_type& of) {
+    const auto found = made_.find(of.first);
+    return found != made_.end() && found->second.holds(of.second);
+  };
+  PartsOfTiles parts = read_by(lattice, boxes);
+  if (std::ranges::all_of(parts, is_made)) return {};
+  for (const auto& [tile, part] : std::exchange(to_be_read_, {})) parts[tile].add(part);
+  std::erase_if(parts, is_made);
+  std::vector<TileAt> out;
+  for (const auto& [tile, part] : parts) {
+    made_[tile].add(part);
+    out.push_back(tile);
+  }
+  return out;
 }
 
 std::vector<KeptGold::TileAt> KeptGold::all_tiles() const {
@@ -258,11 +317,11 @@ std::int64_t KeptGold::missing(const GoldLattice& lattice, const std::vector<Gol
 void KeptGold::prepare(const GoldLattice& lattice, const std::vector<GoldBox>& boxes,
                        const Progress& progress) {
   if (common_) make_common(progress);
-  std::vector<TileAt> tiles = new_tiles(lattice, boxes);
+  std::vector<TileAt> tiles = sparing_ ? sparing_tiles(lattice, boxes) : new_tiles(lattice, boxes);
   if (tiles.empty()) return;
   std::vector<TileAt> all = all_tiles();
   std::erase_if(all, [&](const TileAt& tile) { return tiles_.contains(tile); });
-  if (part_ || 2 * tiles.size() > all.size()) {
+  if (!sparing_ && (part_ || 2 * tiles.size() > all.size())) {
     std::set<TileAt> both(tiles.begin(), tiles.end());
     both.insert(all.begin(), all.end());
     tiles.assign(both.begin(), both.end());
@@ -283,7 +342,7 @@ void KeptGold::back_project_heights(std::span<const TileAt> tiles, const Progres
     run_->pages.emplace_back(state_, scratch(), n * tile, "gold that is kept");
     if (!scratch()) run_->pages.back().fill(0.0f);
     const ColumnBlocks blocks = blocks_of(tiles.subspan(i, n));
-    pages.push_back({nullptr, blocks.first, wanted(blocks)});
+    pages.push_back({nullptr, blocks.first, wanted(tiles.subspan(i, n), blocks)});
     for (std::size_t j = 0; j < n; ++j)
       tiles_[tiles[i + j]] = run_->tiles[tiles[i + j]] = {run_->pages.size() - 1, j * tile};
   }
@@ -379,6 +438,21 @@ std::vector<std::array<std::int32_t, 2>> KeptGold::wanted(const ColumnBlocks& bl
         }
       out.push_back(row);
     }
+  return out;
+}
+
+// Of cone beam: whole tiles, or what of them is read.
+std::vector<std::array<std::int32_t, 4>> KeptGold::wanted(std::span<const TileAt> tiles,
+                                                          const ColumnBlocks& blocks) const {
+  std::vector<std::array<std::int32_t, 4>> out;
+  for (const auto& [first, last] : wanted(blocks)) {
+    const std::int64_t y = std::ssize(out) % side;
+    PartOfTile part{{0, 0, 0}, {side, side, run_->count}};
+    if (sparing_) part = made_.at(tiles[out.size() / at(side)]);
+    const bool none = y < part.low[1] || y >= part.end[1];
+    out.push_back({std::max(first, to_int(part.low[0])), none ? -1 : std::min(last, to_int(part.end[0] - 1)),
+                   to_int(part.low[2]), to_int(part.end[2])});
+  }
   return out;
 }
 

@@ -94,6 +94,13 @@ class KeptGold {
   /// does not suffice. Cost: views * 6 multiply-adds a kept sample, and the upsampled columns of all rows.
   void prepare(const GoldLattice& lattice, const std::vector<GoldBox>& boxes, const Progress& progress);
 
+  /// From now on, of cone beam, prepare() makes what boxes read and no more of their tiles: for those who ask
+  /// for some places. Nodes are the same to the bit.
+  void make_only_what_is_read() { sparing_ = cone_.has_value(); }
+  /// Then the next prepare() that misses anything makes that for these boxes too: its views are upsampled
+  /// once.
+  void will_read(const GoldLattice& lattice, const std::vector<GoldBox>& boxes);
+
   /// float out[box][y][x][stride] from `first` on, `apart` floats from box to box: gold at the nodes of boxes
   /// that were prepared; its z is padded to a multiple of 16. Nodes beyond `reach` hold anything finite. The
   /// boxes are equal, begin at the same height, and at the same node of an interval of kept ones; throws
@@ -147,6 +154,13 @@ class KeptGold {
   }
 
   using TileAt = std::pair<std::int64_t, std::int64_t>;  // y, x
+  // Nodes of a tile by axis, from its first column and the lowest height on: [low, end).
+  struct PartOfTile {
+    Index3 low{side, side, INT64_MAX}, end{};
+    void add(const PartOfTile& other);
+    [[nodiscard]] bool holds(const PartOfTile& other) const;
+  };
+  using PartsOfTiles = std::map<TileAt, PartOfTile>;
   struct Place {
     std::size_t page = 0;
     std::uint64_t first = 0;
@@ -159,14 +173,19 @@ class KeptGold {
   [[nodiscard]] Span span(const GoldLattice& lattice, std::size_t axis, const GoldBox& box) const;
   /// Along z, in whole runs of products wherever the box begins.
   [[nodiscard]] Span heights_span(const GoldLattice& lattice, const GoldBox& box) const;
+  [[nodiscard]] PartsOfTiles read_by(const GoldLattice& lattice, const std::vector<GoldBox>& boxes) const;
   [[nodiscard]] std::vector<TileAt> new_tiles(const GoldLattice& lattice,
                                               const std::vector<GoldBox>& boxes) const;
+  [[nodiscard]] std::vector<TileAt> sparing_tiles(const GoldLattice& lattice,
+                                                  const std::vector<GoldBox>& boxes);
   /// All within reach of the covered part of the grid.
   [[nodiscard]] std::vector<TileAt> all_tiles() const;
   [[nodiscard]] double margin_of(const TileAt& tile) const;
   /// Whether any node of it may be kept.
   [[nodiscard]] bool is_kept(const TileAt& tile) const;
   [[nodiscard]] std::vector<std::array<std::int32_t, 2>> wanted(const ColumnBlocks& blocks) const;
+  [[nodiscard]] std::vector<std::array<std::int32_t, 4>> wanted(std::span<const TileAt> tiles,
+                                                                const ColumnBlocks& blocks) const;
   [[nodiscard]] ColumnBlocks blocks_of(std::span<const TileAt> tiles) const;
   [[nodiscard]] UpsampledSlab upsampled(std::int64_t first, std::int64_t end);
   void back_project_tiles(std::span<const TileAt> tiles, const Progress& progress);
@@ -217,6 +236,8 @@ class KeptGold {
   Index3 half_taps_{8, 8, 8};  // of filters between kept nodes, by axis
   Coverage coverage_;
   std::optional<PlanePart> part_;
+  bool sparing_ = false;
+  PartsOfTiles made_, to_be_read_;  // where sparing: of tiles that are kept; of those that will be asked for
   UpsampledColumns columns_;
   Index3 rates_{1, 1, 1};
   Vec3 spacing_{};  // of kept nodes; of the heights made of the rows, along z

@@ -173,22 +173,35 @@ ExactField::ExactField(const ProjectionSet& scan, const FieldOptions& field, con
 }
 
 // lambda^-2 times the series in u and v, view by view.
+// Some points go together: a view's coefficients are read once for all of them, and sums run side by side.
 std::vector<double> ExactField::at_cone(std::span<const Vec3> points, const Progress& progress) const {
+  constexpr std::size_t group = 8;
   const std::int64_t U = geometry_.columns, V = geometry_.rows;
   const auto columns = static_cast<std::size_t>(U), rows = static_cast<std::size_t>(V);
   std::vector<double> values(points.size());
-  parallel_for(static_cast<std::int64_t>(points.size()), progress, "exact points", [&](std::int64_t i) {
-    double& value = values[static_cast<std::size_t>(i)];
-    std::vector<double> line(columns), basis(rows);
+  const auto groups = static_cast<std::int64_t>((points.size() + group - 1) / group);
+  parallel_for(groups, progress, "exact points", [&](std::int64_t g) {
+    const std::size_t first = static_cast<std::size_t>(g) * group,
+                      count = std::min(group, points.size() - first);
+    std::vector<double> lines(group * columns), basis(rows * group);  // [point][m], [l][point]
+    std::array<Vec3, group> seen{};
     for (std::size_t k = 0; k < views_.size(); ++k) {
-      const auto [u, v, lambda] = projected(views_[k], points[static_cast<std::size_t>(i)]);
+      for (std::size_t i = 0; i < count; ++i) seen[i] = projected(views_[k], points[first + i]);
       for (std::size_t l = 0; l < rows; ++l)
-        basis[l] = std::cos(static_cast<double>(l) * pi * (v + 0.5) / static_cast<double>(V));
+        for (std::size_t i = 0; i < count; ++i)
+          basis[l * group + i] =
+              std::cos(static_cast<double>(l) * pi * (seen[i][1] + 0.5) / static_cast<double>(V));
       for (std::size_t m = 0; m < columns; ++m) {
         const double* a = coefficients_.get() + (k * columns + m) * rows;
-        line[m] = std::inner_product(basis.begin(), basis.end(), a, 0.0);
+        std::array<double, group> sums{};
+        for (std::size_t l = 0; l < rows; ++l)
+          for (std::size_t i = 0; i < group; ++i) sums[i] += a[l] * basis[l * group + i];
+        for (std::size_t i = 0; i < count; ++i) lines[i * columns + m] = sums[i];
       }
-      value += cosine_sum(line.data(), U, pi * (u + 0.5) / static_cast<double>(U)) / (lambda * lambda);
+      for (std::size_t i = 0; i < count; ++i)
+        values[first + i] +=
+            cosine_sum(lines.data() + i * columns, U, pi * (seen[i][0] + 0.5) / static_cast<double>(U)) /
+            (seen[i][2] * seen[i][2]);
     }
   });
   return values;

@@ -64,21 +64,18 @@ double arithmetic_of(Filtered& f, const Grid& base, const Vec3& spacing, double 
                           interpolation, fp64);
 }
 
-/// The field at the grid's samples as build makes it, and what it errs, here and where the file was built.
-struct BaseAgain {
-  Volume base;
+/// What the field errs at the grid's samples, as build makes it: by rounding, here and where the file was
+/// built, and by interpolation.
+struct BaseErrors {
   double rounding = 0, rounding_of_build = 0, projection = 0;
 };
 
-// Of parallel beam a reconstruction with six taps at 8x, of cone beam gold at the samples.
-BaseAgain base_again(Filtered& f, const MixedVolume& v, KeptGold& kept, bool same_device,
-                     const Progress& progress) {
+// Of parallel beam those of a reconstruction with six taps at 8x, of cone beam those of gold at the samples.
+BaseErrors base_errors(Filtered& f, const MixedVolume& v, KeptGold& kept, bool same_device) {
   if (f.is_cone()) {
     const GoldLattice lattice = kept.lattice(v.grid, 1);
     const GoldErrors errors = kept.errors(lattice);
-    return {base_of_gold(f.state, kept, Coverage(f.scan.geometry, f.scan.views), v.grid,
-                         kept_margin(v.grid, 1), progress),
-            errors.rounding + errors.ramp, kept.rounding_elsewhere(lattice, same_device).second + errors.ramp,
+    return {errors.rounding + errors.ramp, kept.rounding_elsewhere(lattice, same_device).second + errors.ramp,
             errors.interpolation};
   }
   const double side = static_cast<double>(std::max(v.grid.cells[0], v.grid.cells[1]) + 2);
@@ -86,32 +83,79 @@ BaseAgain base_again(Filtered& f, const MixedVolume& v, KeptGold& kept, bool sam
     return arithmetic_of(f, v.grid, v.grid.spacing, side, 8, Interpolation::six_taps, fp64);
   };
   const double here = rounding(Fp64::as_here);
-  return {reconstruct_field(f.state, f.scan, f.upsampler, v.grid, 8, Interpolation::six_taps, progress), here,
-          same_device ? here : std::max(rounding(Fp64::present), rounding(Fp64::absent)),
+  return {here, same_device ? here : std::max(rounding(Fp64::present), rounding(Fp64::absent)),
           six_tap_facts().sup * f.sups.value};
+}
+
+Volume base_again(Filtered& f, const MixedVolume& v, KeptGold& kept, const Progress& progress) {
+  return f.is_cone()
+             ? base_of_gold(f.state, kept, Coverage(f.scan.geometry, f.scan.views), v.grid,
+                            kept_margin(v.grid, 1), progress)
+             : reconstruct_field(f.state, f.scan, f.upsampler, v.grid, 8, Interpolation::six_taps, progress);
+}
+
+// F at the second place, by other means, less F at the first.
+double exact_range(const Filtered& f, const ExactField& exact, const std::array<Vec3, 2>& at) {
+  const std::vector<double> F = exact.at(std::array{to_world(at[0], f.units), to_world(at[1], f.units)});
+  return from_world(F[1], f.units) - from_world(F[0], f.units);
 }
 
 // One made again has the same interpolation error but for rounding, and the extremes of two fields differ by
 // no more than the fields do.
 void compare_range(Differences& out, Filtered& f, const ExactField& exact, const MixedVolume& v,
                    const Certificate& c, KeptGold& kept, bool same_device, const Progress& progress) {
-  const BaseAgain again = base_again(f, v, kept, same_device, progress);
-  const CoveredRange range = covered_range(again.base, Coverage(f.scan.geometry, f.scan.views));
+  const BaseErrors errs = base_errors(f, v, kept, same_device);
+  const CoveredRange range =
+      covered_range(base_again(f, v, kept, progress), Coverage(f.scan.geometry, f.scan.views));
   const double found = range.high - range.low;
-  const double apart = 2 * (again.rounding + again.rounding_of_build);
+  const double apart = 2 * (errs.rounding + errs.rounding_of_build);
   if (!(std::abs(c.reference_range - found) <= apart))
     out.push_back(fmt::format("reference_range is {}, not {} within {:.3g}", f.world(c.reference_range),
                               f.world(found), f.world(apart)));
-  // F itself at the two extremes, by other means: the range cannot be smaller.
-  const std::array points{to_world(v.grid.position(range.low_at), f.units),
-                          to_world(v.grid.position(range.high_at), f.units)};
-  std::vector<double> F = exact.at(points);
-  for (double& value : F) value = from_world(value, f.units);
-  const double least =
-      F[1] - F[0] - 2 * (again.projection + again.rounding + from_world(exact.rounding(), f.units));
-  if (!(c.reference_range >= least))
+  // F itself at the two extremes: the range cannot be smaller.
+  const double exactly =
+      exact_range(f, exact, {v.grid.position(range.low_at), v.grid.position(range.high_at)});
+  if (!(c.reference_range >=
+        exactly - 2 * (errs.projection + errs.rounding + from_world(exact.rounding(), f.units))))
     out.push_back(fmt::format("reference_range is {}, below F's own {} between two samples",
-                              f.world(c.reference_range), f.world(F[1] - F[0])));
+                              f.world(c.reference_range), f.world(exactly)));
+}
+
+bool is_covered_sample(const Grid& grid, const Coverage& coverage, const Vec3& place) {
+  Index3 sample{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double steps = (place[a] - grid.origin[a]) / grid.spacing[a];
+    if (!(steps > -0.5 && steps < static_cast<double>(grid.cells[a]) + 0.5)) return false;
+    sample[a] = std::llround(steps);
+    // World units and others round by less.
+    if (!(std::abs(steps - static_cast<double>(sample[a])) <= 1e-6)) return false;
+  }
+  const Vec3 p = grid.position(sample);
+  return coverage.margin(p[0], p[1]) >= 0 && coverage.margin_z(p[2]) >= 0;
+}
+
+// Where the certificate says between which covered samples its range lies, F there proves that it is none too
+// large, so that the tolerance is not. One that is too small promises more than was asked for.
+void compare_range_at(Differences& out, Filtered& f, const ExactField& exact, const MixedVolume& v,
+                      const Certificate& c, KeptGold& kept, bool same_device) {
+  const Coverage coverage(f.scan.geometry, f.scan.views);
+  for (const Vec3& place : *c.range_at)
+    if (!is_covered_sample(v.grid, coverage, place)) {
+      out.push_back(
+          fmt::format("range_at: no sample of the grid that the scan covers is at ({:.6g}, {:.6g}, "
+                      "{:.6g})",
+                      to_world(place, f.units)[0], to_world(place, f.units)[1], to_world(place, f.units)[2]));
+      return;
+    }
+  const BaseErrors errs = base_errors(f, v, kept, same_device);
+  const double exactly = exact_range(f, exact, *c.range_at),
+               apart = 2 * (errs.projection + std::max(errs.rounding, errs.rounding_of_build) +
+                            from_world(exact.rounding(), f.units));
+  if (!(std::abs(c.reference_range - exactly) <= apart))
+    out.push_back(
+        fmt::format("reference_range is {}, not F's own {} between the samples of range_at within "
+                    "{:.3g}",
+                    f.world(c.reference_range), f.world(exactly), f.world(apart)));
 }
 
 /// |V - gold| + T + P of the selected bricks, as build measures them.
@@ -142,6 +186,8 @@ class Totals {
                const Progress& progress) {
     const std::vector<std::uint8_t> near = gold_.fine().bricks_near_coverage();
     for (std::size_t i = 0; i < selected.size(); ++i) selected[i] = selected[i] && near[i];
+    if (!exhaustive) kept().make_only_what_is_read();
+    gold_.fine().will_measure(selected);
     // A brick has its total from one rate of gold: the coarse one explains most, for an eighth of the
     // work.
     if (GoldStream* coarse = gold_.coarse()) {
@@ -322,7 +368,9 @@ void compare_in_units(Differences& out, Device& device, const ProjectionSet& sca
   Filtered f(device.state(), scan, units, stored.field, stored.rates.interpolation, progress);
   const bool same_device = device.info().name == stored.device && device.info().driver == stored.driver;
   Totals totals(f, volume, stored, same_device);
-  compare_range(out, f, exact, volume, stored, totals.kept(), same_device, progress);
+  if (exhaustive || !stored.range_at)
+    compare_range(out, f, exact, volume, stored, totals.kept(), same_device, progress);
+  if (stored.range_at) compare_range_at(out, f, exact, volume, stored, totals.kept(), same_device);
   if (same_device && stored.version == VDVR_VERSION && stored.padding != f.scan.fft_length)
     out.push_back(fmt::format("field.padding is {}, not {}", stored.padding, f.scan.fft_length));
   totals.compare(out, selected, exhaustive, progress);

@@ -77,6 +77,9 @@ struct Certificate {
   double epsilon = 0;          ///< fraction of reference_range
   double epsilon_abs = 0;      ///< density units
   double reference_range = 0;  ///< max - min of F over covered 1x samples
+  /// The smallest and the largest of these, world units. Nothing where none is covered, and in files of
+  /// earlier versions.
+  std::optional<std::array<Vec3, 2>> range_at;
   /// Stored in a file that holds a seal over it (docs/file-format.md).
   bool sealed = false;
   /// No certificate, but the record of a volume that nothing certifies (Comparison): what was measured and

@@ -62,6 +62,7 @@ struct Plan {
   PlanSettings settings;
   FieldOptions field;
   double epsilon = 0, epsilon_abs = 0, reference_range = 0;
+  std::optional<std::array<Vec3, 2>> range_at;  ///< Certificate::range_at
   Rates rates;
   VolumeLayout layout;
   std::vector<Bound> bounds;       ///< all that were computed

@@ -1,9 +1,10 @@
 // Kept nodes of cone beam: out[tile][y][x][height] += sum_k lambda^-2 q_k(u, v), by six taps both ways from
 // tables of eight values a pixel (docs/error-bounds.md, section 16). Layouts: float table[view][column][row];
-// ConeView views[tile][block][view]; int2 wanted[tile][y]: first and last column of nodes. Places are in
-// columns and rows of the table, relative to the middle of a block of nodes. Neighbours in y, which read the
-// same columns and rows, follow one another. Of upright detectors, in double precision, values are those of
-// cone_runs.cl to the bit. Called by host/certify/kept/cone_tiles.cpp.
+// ConeView views[tile][block][view]; int4 wanted[tile][y]: first and last column of nodes, the first height
+// and the one after the last. Places are in columns and rows of the table, relative to the middle of a block
+// of nodes. Neighbours in y, which read the same columns and rows, follow one another. Of upright detectors,
+// in double precision, values are those of cone_runs.cl to the bit. Called by
+// host/certify/kept/cone_tiles.cpp.
 #include "device/cone_taps.h"
 #include "device/lanes.h"
 #include "shared/cone_nodes.h"
@@ -41,11 +42,11 @@
 #define IN_RUNS (VDVR_UPRIGHT && VDVR_DOUBLE)
 
 __kernel void cone_nodes(__global float* out, __global const float* table, __global const ConeView* views,
-                         __global const int2* wanted, ulong first, VdvrConeNodes s) {
+                         __global const int4* wanted, ulong first, VdvrConeNodes s) {
   const int y = (int)get_global_id(0), height = (int)get_global_id(1) * VDVR_LANES,
             tile = (int)get_global_id(2), group = height / VDVR_CONE_HEIGHTS;
   if (y >= VDVR_CONE_TILE || group >= s.groups || tile >= s.tiles) return;
-  const int2 range = wanted[tile * VDVR_CONE_TILE + y];
+  const int4 range = wanted[tile * VDVR_CONE_TILE + y];
   const int column_stride = s.column_stride, views_all = s.views, block_z = group / s.block_groups,
             block_y = y / s.block_side;
   const float half_side = 0.5f * (float)(s.block_side - 1),

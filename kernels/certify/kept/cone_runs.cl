@@ -87,29 +87,39 @@ static ALWAYS_INLINE void look_at(Seen* seen, __global const float* plane, __glo
   place_heights(seen, lowest, slope, whole_v - low, min(chunks * 16 - VDVR_CONE_HEIGHTS, last_row - low));
 }
 
-#define CLEAR(n) float8 sum##n = (float8)(0.0f);
-#define ADD(n) sum##n = fma(taps(g[n]), vload8(0, strip + row[n]), sum##n);
-#define PUT(n) to[n] += sum_of(sum##n);
-// Adds eight heights of some views.
-static ALWAYS_INLINE void add_heights(float* to, const Seen* seen, int views, int first) {
-  FOR_LANES(CLEAR)
-  for (int i = 0; i < views; ++i) {
-    const float *strip = (const float*)seen[i].strip, *g = seen[i].g + first;
-    const int* row = seen[i].row + first;
-    FOR_LANES(ADD)
+#define FOR_PAIRS(DO) DO(0, 0, 1) DO(1, 2, 3) DO(2, 4, 5) DO(3, 6, 7)
+#define CLEAR(n, i, j) float16 sum##n = (float16)(0.0f);
+#define ADD(n, i, j)                                                                      \
+  {                                                                                       \
+    const float16 place = (float16)((float8)(g[i]), (float8)(g[j])),                      \
+                  rows = (float16)(vload8(0, strip + row[i]), vload8(0, strip + row[j])); \
+    sum##n = fma(taps_of_two(place), rows, sum##n);                                       \
   }
-  FOR_LANES(PUT)
+#define PUT(n, i, j)          \
+  to[i] += sum_of(sum##n.lo); \
+  to[j] += sum_of(sum##n.hi);
+// Adds eight heights of some views, two of them in a vector.
+static ALWAYS_INLINE void add_heights(float* to, const Seen* seen, int views, int first) {
+  FOR_PAIRS(CLEAR)
+  for (int k = 0; k < views; ++k) {
+    const float *strip = (const float*)seen[k].strip, *g = seen[k].g + first;
+    const int* row = seen[k].row + first;
+    FOR_PAIRS(ADD)
+  }
+  FOR_PAIRS(PUT)
 }
 
 __kernel void cone_runs(__global float* out, __global const float* table, __global const ConeView* views,
-                        __global const int2* wanted, ulong first, VdvrConeNodes s) {
+                        __global const int4* wanted, ulong first, VdvrConeNodes s) {
   const int first_y = (int)get_global_id(0) * VDVR_CONE_ROWS, height = (int)get_global_id(1) * RUN,
             tile = (int)get_global_id(2), heights = min(s.groups * VDVR_CONE_HEIGHTS - height, RUN);
   if (first_y >= VDVR_CONE_TILE || heights <= 0 || tile >= s.tiles) return;
   const double half_side = 0.5f * (double)(VDVR_CONE_TILE - 1),
                dz = (double)height - 0.5f * (double)(s.groups * VDVR_CONE_HEIGHTS - 1);
   __global const ConeView* of_tile = views + (size_t)tile * s.views;
-  __global const int2* ranges = wanted + tile * VDVR_CONE_TILE + first_y;
+  __global const int4* ranges = wanted + tile * VDVR_CONE_TILE + first_y;
+  // All rows of a tile want the same heights.
+  if (height >= ranges[0].w || height + heights <= ranges[0].z) return;
   float sums[VDVR_CONE_ROWS * VDVR_CONE_TILE * RUN];
   for (int i = 0; i < VDVR_CONE_ROWS * VDVR_CONE_TILE * RUN / 16; ++i) vstore16((float16)(0.0f), i, sums);
   Seen seen[TOGETHER];

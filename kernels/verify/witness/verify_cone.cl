@@ -106,18 +106,24 @@ static inline ALWAYS_INLINE void look_up(Seen* seen, __global const View* view, 
   }
 }
 
-#define TAKE(n) float8 sum##n = of[n];
-#define ADD_ROWS(n) sum##n = fma(lagrange(part[n]), vload8(0, strip + row[n]), sum##n);
-#define KEEP(n) of[n] = sum##n;
-// Adds some views at eight heights, from `first` of the block on.
-static inline ALWAYS_INLINE void add_views(float8* of, const Seen* seen, int views, int first) {
-  FOR_LANES(TAKE)
+#define FOR_PAIRS(DO) DO(0) DO(1) DO(2) DO(3)
+#define TAKE(n) float16 sum##n = vload16(n, of);
+#define ADD_ROWS(n)                                                                                   \
+  {                                                                                                   \
+    const float16 place = (float16)((float8)(part[2 * n]), (float8)(part[2 * n + 1])),                \
+                  rows = (float16)(vload8(0, strip + row[2 * n]), vload8(0, strip + row[2 * n + 1])); \
+    sum##n = fma(lagrange_of_two(place), rows, sum##n);                                               \
+  }
+#define KEEP(n) vstore16(sum##n, n, of);
+// Adds some views at eight heights, from `first` of the block on, two of them in a vector.
+static inline ALWAYS_INLINE void add_views(float* of, const Seen* seen, int views, int first) {
+  FOR_PAIRS(TAKE)
   for (int i = 0; i < views; ++i) {
     const float *strip = (const float*)seen[i].strip, *part = seen[i].part + first;
     const int* row = seen[i].row + first;
-    FOR_LANES(ADD_ROWS)
+    FOR_PAIRS(ADD_ROWS)
   }
-  FOR_LANES(KEEP)
+  FOR_PAIRS(KEEP)
 }
 
 // Adds the table's views at a block of heights of eight nodes along x.
@@ -145,9 +151,9 @@ __kernel void verify_cone(__global float* nodes, __global const float* table, __
       for (int i = 0; i < together; ++i)
         look_up(seen + i, own + k + i, table + (size_t)(k + i) * plane_size, dx, dy, s.rows, last_column,
                 last_row);
-      float8* of = sums + x * VDVR_VERIFY_CONE_BLOCK;
+      float* of = (float*)(sums + x * VDVR_VERIFY_CONE_BLOCK);
       add_views(of, seen, together, 0);
-      if (more) add_views(of + 8, seen, together, 8);
+      if (more) add_views(of + 64, seen, together, 8);
     }
   }
   for (int x = range.x; x <= range.y; ++x) {
