@@ -1,6 +1,9 @@
 // The weights of device/eight_points.h, for eight_points_test.cpp, which puts this text behind that header.
-// Layouts: float places[item]; float weights[item][8].
+// Layouts: float places[item]; float weights[item][8], by themselves, then two items at a time.
 __kernel void weigh(__global const float* places, __global float* weights, int items) {
-  const int i = (int)get_global_id(0);
-  if (i < items) vstore8(lagrange(places[i]), i, weights);
+  const int i = (int)get_global_id(0), pair = i / 2 * 2;
+  if (i >= items) return;
+  vstore8(lagrange(places[i]), i, weights);
+  const float16 of_two = lagrange_of_two((float16)((float8)(places[pair]), (float8)(places[pair + 1])));
+  vstore8(i == pair ? of_two.lo : of_two.hi, items + i, weights);
 }
