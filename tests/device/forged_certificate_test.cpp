@@ -194,10 +194,10 @@ BOOST_AUTO_TEST_CASE(a_range_is_compared_where_it_is_attained) {
     for (const std::size_t which : {0u, 1u}) {
       c = right;
       (*c.range_at)[which][0] += 0.5 * spacing[0];
-      BOOST_TEST(finds(c, "range_at", exhaustive));
+      BOOST_TEST(finds(c, "range_at: no sample", exhaustive));
       c = right;
       (*c.range_at)[which] = made().volume.grid.origin;  // a corner, which no view sees
-      BOOST_TEST(finds(c, "range_at", exhaustive));
+      BOOST_TEST(finds(c, "range_at: no sample", exhaustive));
       c = right;
       (*c.range_at)[which] = (*c.range_at)[1 - which];
       BOOST_TEST(finds(c, "reference_range", exhaustive));
