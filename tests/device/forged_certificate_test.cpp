@@ -196,7 +196,7 @@ BOOST_AUTO_TEST_CASE(a_range_is_compared_where_it_is_attained) {
       (*c.range_at)[which][0] += 0.5 * spacing[0];
       BOOST_TEST(finds(c, "range_at: no sample", exhaustive));
       c = right;
-      (*c.range_at)[which] = made().volume.grid.origin;  // a corner, which no view sees
+      (*c.range_at)[which][1] = made().volume.grid.origin[1] - 3 * spacing[1];  // beyond the grid
       BOOST_TEST(finds(c, "range_at: no sample", exhaustive));
       c = right;
       (*c.range_at)[which] = (*c.range_at)[1 - which];

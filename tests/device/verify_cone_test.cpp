@@ -381,6 +381,11 @@ BOOST_AUTO_TEST_CASE(edited_terms_are_told) {
   BOOST_TEST(
       names(changed([](Certificate& c) { c.not_covered_count += 1; }).differences, "not_covered.count"));
   BOOST_TEST(!changed([](Certificate& c) { c.reference_range *= 1.01; }).holds);
+  for (const std::size_t which : {0u, 1u})  // a corner, which no view sees
+    BOOST_TEST(names(changed([&](Certificate& c) {
+                       (*c.range_at)[which] = built().result.volume.grid.origin;
+                     }).differences,
+                     "range_at: no sample"));
 }
 
 // What a view sees beyond the certified cylinder is promised nothing.
