@@ -239,6 +239,7 @@ void add_verification(nb::module_& m) {
       .def(nb::init<>())
       .def_rw("exhaustive", &VerifyOptions::exhaustive)
       .def_rw("fraction", &VerifyOptions::fraction)
+      .def_rw("most_of_cone", &VerifyOptions::most_of_cone)
       .def_rw("seed", &VerifyOptions::seed);
   nb::class_<FileVerification>(m, "Verification", "What `verify` found. Errors are densities.")
       .def_ro("holds", &FileVerification::holds,
