@@ -21,7 +21,7 @@ struct VerifyOptions {
   double fraction = 0.02;   ///< of the bricks, when not exhaustive
   unsigned seed = 1;
   /// Bricks of a sample of cone beam at most, where nodes of F are dear, but for those of rare levels. Where
-  /// one brick in 500 is wrong, 2,000 drawn by chance hold one with a probability of 98 %.
+  /// one brick in 500 is wrong, scattered over the volume, 2,000 hold one with a probability of 98 %.
   std::size_t most_of_cone = 2000;
 };
 
