@@ -31,7 +31,7 @@ void fill(const FrameBlock& block, double* out) {
 
 FrameReader reader_of(FrameReader::Read read, std::uint64_t frames_at_once = 3,
                       std::uint64_t max_memory_bytes = 0) {
-  return {"scan.h5", max_memory_bytes, 0, numbers, frames_at_once * numbers * sizeof(double),
+  return {"scan.h5",      max_memory_bytes, 0, numbers, frames_at_once * numbers * sizeof(double),
           std::move(read)};
 }
 
