@@ -349,23 +349,28 @@ double Forecaster::first_pass_seconds(const NodeTolerance& tolerance) {
   return large.seconds(first, purpose, near_);
 }
 
-BuildForecast Forecaster::forecast(NodeTolerance tolerance) {
+NodeTolerance Forecaster::in_own_units(NodeTolerance tolerance) const {
   const Units& units = prepared_->of.units;
   tolerance.of_all = from_world(tolerance.of_all, units);
   for (float& one : tolerance.by_brick) one = static_cast<float>(from_world(static_cast<double>(one), units));
+  return tolerance;
+}
+
+// What becomes of every brick, from some of every stratum.
+struct Forecaster::Fates {
+  double tile_samples = 0;
+  std::array<std::vector<std::uint8_t>, fates> bricks;
+};
+
+Forecaster::Fates Forecaster::foresee(const NodeTolerance& tolerance) {
   const GoldSettings& settings = gold_.fine().settings();
   const Index3 n = Bricks(settings.grid, settings.granularity).along();
-  const bool screens = gold_.coarse() != nullptr;
-  const double first_pass = first_pass_seconds(tolerance);
-  // Bricks of every stratum tell what follows it.
   std::map<int, Stratum> strata =
       strata_of(near_, looked_at_, error_, tolerance, n, settings.part.has_value());
   std::vector<std::uint8_t> sampled(near_.size(), 0);
   for (const auto& [key, s] : strata)
     for (const std::int64_t i : s.candidates) sampled[at(i)] = 1;
-  Paces small(gold_);
   const auto classes = classify(tolerance, sampled);
-  BuildForecast out;
   measured_.clear();
   for (auto& [key, s] : strata)
     for (const std::int64_t i : s.candidates) {
@@ -375,31 +380,46 @@ BuildForecast Forecaster::forecast(NodeTolerance tolerance) {
       s.tile_samples += c.samples;
       if (c.measure.total >= 0) s.share[c.fate(settings.rate)] += 1;
     }
-
-  tile_pace_ = small.pace(gold_.fine(), GoldStream::For::samples);
-  measure_pace_ = small.pace(gold_.fine(), GoldStream::For::measuring);
-
   // A stratum without a brick in the layers takes after the one below it.
-  double tile_samples = 0, mean = 0;
+  Fates out;
+  for (auto& b : out.bricks) b.assign(near_.size(), 0);
+  double mean = 0;
   std::array<double, fates> share{};
-  std::array<std::vector<std::uint8_t>, fates> bricks;
-  for (auto& b : bricks) b.assign(near_.size(), 0);
   for (const auto& [key, s] : strata) {
     if (s.seen > 0) {
       mean = s.tile_samples / s.seen;
       for (std::size_t f = 0; f < fates; ++f) share[f] = s.share[f] / s.seen;
     }
-    tile_samples += mean * static_cast<double>(s.bricks.size());
+    out.tile_samples += mean * static_cast<double>(s.bricks.size());
     std::size_t next = 0;
     for (const Fate fate : {fine_refined, proposed, coarse_refined, finer_stays, fine_stays})
       for (double i = 0; i < share[fate] * static_cast<double>(s.bricks.size()) && next < s.bricks.size();
            ++i)
-        bricks[fate][at(s.bricks[next++])] = 1;
+        out.bricks[fate][at(s.bricks[next++])] = 1;
   }
-  const auto samples = static_cast<double>(base_samples_);
-  out.samples_ratio =
-      (static_cast<double>(stored_.size()) + static_cast<double>(near_.size()) + tile_samples) / samples;
-  out.tile_bytes = static_cast<std::uint64_t>(4 * tile_samples);
+  return out;
+}
+
+double Forecaster::ratio_of(const Fates& foreseen) const {
+  return (static_cast<double>(stored_.size()) + static_cast<double>(near_.size()) + foreseen.tile_samples) /
+         static_cast<double>(base_samples_);
+}
+
+double Forecaster::samples_ratio(const NodeTolerance& tolerance) {
+  return ratio_of(foresee(in_own_units(tolerance)));
+}
+
+BuildForecast Forecaster::forecast(const NodeTolerance& wanted) {
+  const NodeTolerance tolerance = in_own_units(wanted);
+  const double first_pass = first_pass_seconds(tolerance);
+  Paces small(gold_);
+  Fates foreseen = foresee(tolerance);
+  auto& bricks = foreseen.bricks;
+  tile_pace_ = small.pace(gold_.fine(), GoldStream::For::samples);
+  measure_pace_ = small.pace(gold_.fine(), GoldStream::For::measuring);
+  BuildForecast out;
+  out.samples_ratio = ratio_of(foreseen);
+  out.tile_bytes = static_cast<std::uint64_t>(4 * foreseen.tile_samples);
   add_kept(out);
   out.seconds = first_pass + out.kept_seconds;
   const auto add = [&](GoldStream& gold, GoldStream::For purpose, const std::vector<std::uint8_t>& of) {
@@ -408,7 +428,7 @@ BuildForecast Forecaster::forecast(NodeTolerance tolerance) {
   using For = GoldStream::For;
   std::vector<std::uint8_t> hard = bricks[proposed];
   for (std::size_t i = 0; i < hard.size(); ++i) hard[i] = hard[i] || bricks[fine_refined][i];
-  if (screens) {
+  if (gold_.coarse() != nullptr) {
     GoldStream& coarse = *gold_.coarse();
     for (const Fate stays : {fine_stays, finer_stays}) add(gold_.fine(), For::measuring, bricks[stays]);
     if (gold_.finer()) add(*gold_.finer(), For::measuring, bricks[finer_stays]);

@@ -60,7 +60,9 @@ class Forecaster {
   /// Classifies a few whole blocks, which tells the time, and some bricks of every stratum of expected error,
   /// which tells the storage, among those to look at. `tolerance` is what the node test may take. Raising
   /// bricks after closing is not foreseen. Cost: about 1 % of the build.
-  BuildForecast forecast(NodeTolerance tolerance);
+  BuildForecast forecast(const NodeTolerance& tolerance);
+  /// Of that, the samples stored per base sample. Cost: half.
+  double samples_ratio(const NodeTolerance& tolerance);
 
   /// What closing takes that adds so many levels to bricks, one in each round of repair: their tiles anew and
   /// their measure, at the pace of what was foreseen last.
@@ -77,6 +79,10 @@ class Forecaster {
 
  private:
   struct Classified;
+  struct Fates;
+  [[nodiscard]] NodeTolerance in_own_units(NodeTolerance tolerance) const;
+  Fates foresee(const NodeTolerance& tolerance);
+  [[nodiscard]] double ratio_of(const Fates& foreseen) const;
   std::vector<Classified> classify(const NodeTolerance& tolerance, const std::vector<std::uint8_t>& selected);
   void add_kept(BuildForecast& out);
   double first_pass_seconds(const NodeTolerance& tolerance);

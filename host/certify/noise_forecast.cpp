@@ -91,7 +91,7 @@ std::vector<SigmaForecast> forecast_in_sigma(const Plan& plan, const BrickSigma&
       brick = static_cast<float>(wanted > 0 ? wanted : plan.epsilon_abs);
       tolerance.of_all = std::max(tolerance.of_all, static_cast<double>(brick));
     }
-    if (tolerance.of_all > 0) out.push_back({multiple, plan.forecaster->forecast(tolerance).samples_ratio});
+    if (tolerance.of_all > 0) out.push_back({multiple, plan.forecaster->samples_ratio(tolerance)});
   }
   return out;
 }

@@ -46,27 +46,49 @@ double rounding(const NodeFunctional& f, double magnitude) {
   return 8 * static_cast<double>(f.taps.size() + highest + 4) * 0x1p-53 * magnitude;
 }
 
-// e and its derivatives up to the `count`-th, exclusive.
-void symbol(const NodeFunctional& f, double kappa, std::size_t count, Complex* derivative) {
-  std::fill(derivative, derivative + count, Complex{});
-  const Complex turn = std::polar(1.0, kappa);
-  Complex wave = std::polar(1.0, kappa * f.first);
-  for (std::size_t i = 0; i < f.taps.size(); ++i) {
-    double term = f.taps[i];
-    const double place = f.first + static_cast<double>(i);
-    for (std::size_t m = 0; m < count; ++m, term *= place) derivative[m] += term * wave;
-    wave = {wave.real() * turn.real() - wave.imag() * turn.imag(),
-            wave.real() * turn.imag() + wave.imag() * turn.real()};
+// e and its derivatives up to the `count`-th, exclusive, at one frequency after another.
+class Symbol {
+ public:
+  Symbol(const NodeFunctional& f, std::size_t count)
+      : f_(f), count_(count), terms_(f.taps.size() * count), real_(count), imag_(count) {
+    for (std::size_t i = 0; i < f.taps.size(); ++i) {
+      double term = f.taps[i];
+      const double place = f.first + static_cast<double>(i);
+      for (std::size_t m = 0; m < count; ++m, term *= place) terms_[i * count + m] = term;
+    }
   }
+
   // i^m of the derivatives does not matter for magnitudes, but for what is taken off: i^order kappa^order.
-  for (std::size_t m = 0; m < count && static_cast<int>(m) <= f.order; ++m) {
-    const int left = f.order - static_cast<int>(m);
-    double power = factorial_ratio(f.order, static_cast<int>(m));
-    for (int i = 0; i < left; ++i) power *= kappa;
-    constexpr std::array<Complex, 4> powers_of_i{{{1, 0}, {0, 1}, {-1, 0}, {0, -1}}};
-    derivative[m] -= power * powers_of_i[static_cast<std::size_t>(left % 4)];
+  void at(double kappa, std::vector<Complex>& derivative) {
+    std::ranges::fill(real_, 0.0);
+    std::ranges::fill(imag_, 0.0);
+    const Complex turn = std::polar(1.0, kappa);
+    double re = std::cos(kappa * f_.first), im = std::sin(kappa * f_.first);
+    for (std::size_t i = 0; i < f_.taps.size(); ++i) {
+      const double* const term = terms_.data() + i * count_;
+      for (std::size_t m = 0; m < count_; ++m) {
+        real_[m] += term[m] * re;
+        imag_[m] += term[m] * im;
+      }
+      const double next = re * turn.real() - im * turn.imag();
+      im = re * turn.imag() + im * turn.real();
+      re = next;
+    }
+    for (std::size_t m = 0; m < count_; ++m) derivative[m] = {real_[m], imag_[m]};
+    for (std::size_t m = 0; m < count_ && static_cast<int>(m) <= f_.order; ++m) {
+      const int left = f_.order - static_cast<int>(m);
+      double power = factorial_ratio(f_.order, static_cast<int>(m));
+      for (int i = 0; i < left; ++i) power *= kappa;
+      constexpr std::array<Complex, 4> powers_of_i{{{1, 0}, {0, 1}, {-1, 0}, {0, -1}}};
+      derivative[m] -= power * powers_of_i[static_cast<std::size_t>(left % 4)];
+    }
   }
-}
+
+ private:
+  const NodeFunctional& f_;
+  std::size_t count_;
+  std::vector<double> terms_, real_, imag_;  // [tap][derivative], and what they add up to
+};
 
 // At least |e^(n + m)| on [from, to] for every moment n < moments and m <= highest: a function lies at most
 // step^2 / 8 times its second derivative above the largest of its values `step` apart. The highest two are
@@ -76,8 +98,9 @@ std::vector<UpToHighest> largest_derivatives(const NodeFunctional& f, double fro
   const std::size_t known = highest - 1;  // of each moment
   std::vector<Complex> at(moments + known - 1);
   std::vector<double> squares(at.size(), 0.0), all;
+  Symbol symbol(f, at.size());
   for (int s = 0; s <= steps; ++s) {
-    symbol(f, from + (to - from) * s / steps, at.size(), at.data());
+    symbol.at(from + (to - from) * s / steps, at);
     for (std::size_t m = 0; m < at.size(); ++m) squares[m] = std::max(squares[m], std::norm(at[m]));
   }
   for (std::size_t m = 0; m < moments + highest; ++m) all.push_back(magnitude(f, m, to));
@@ -146,11 +169,12 @@ std::vector<double> coefficient_sums(const NodeFunctional& f, const std::vector<
   const std::size_t moments = inside.size();
   std::vector<std::vector<Complex>> g(moments, std::vector<Complex>(series_samples));
   std::vector<Complex> at(moments);
+  Symbol symbol(f, moments);
   for (std::size_t s = 0; s <= half; ++s) {
     const double kappa = end * static_cast<double>(s) / static_cast<double>(half);
     const double factor = cut((kappa - band) / (end - band));
     if (!(factor > 0)) continue;  // the last is half: it is 0
-    symbol(f, kappa, moments, at.data());
+    symbol.at(kappa, at);
     for (std::size_t n = 0; n < moments; ++n) {
       g[n][s] = at[n] * factor;
       if (s > 0) g[n][series_samples - s] = std::conj(g[n][s]);
@@ -161,7 +185,7 @@ std::vector<double> coefficient_sums(const NodeFunctional& f, const std::vector<
   for (std::size_t n = 0; n < moments; ++n) {
     transform.forward(g[n]);
     double sum = 0;
-    for (const Complex& a : g[n]) sum += std::sqrt(std::norm(a)) / series_samples;
+    for (const Complex& a : g[n]) sum += std::abs(a.real()) / series_samples;  // real, since e(-kappa) = e(kappa)*
     // Errors of the samples and of the FFT, in the 2-norm: sum |a_j| <= sqrt(samples) times the norm of all
     // a_j.
     const double noise = std::sqrt(double{series_samples}) * 8 * rounding(f, magnitude(f, n, end));
@@ -173,9 +197,9 @@ std::vector<double> coefficient_sums(const NodeFunctional& f, const std::vector<
 }  // namespace
 
 double symbol_error(const NodeFunctional& functional, double kappa) {
-  Complex e;
-  symbol(functional, kappa, 1, &e);
-  return std::abs(e) + rounding(functional, magnitude(functional, 0, kappa));
+  std::vector<Complex> e(1);
+  Symbol(functional, 1).at(kappa, e);
+  return std::abs(e[0]) + rounding(functional, magnitude(functional, 0, kappa));
 }
 
 double largest_symbol_error(const NodeFunctional& functional, double band) {

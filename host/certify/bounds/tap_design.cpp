@@ -1,6 +1,7 @@
 #include "host/certify/bounds/tap_design.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <complex>
 #include <cstddef>
@@ -39,27 +40,33 @@ struct Rows {
     for (std::size_t n = 0; n < taps; ++n) sum += h[n] * row(i)[n];
     return sum;
   }
-  [[nodiscard]] double largest_residual(const Vector& h) const {
-    double largest = 0;
-    for (std::size_t i = 0; i < count; ++i) largest = std::max(largest, std::abs(residual(i, h)));
-    return largest;
+  [[nodiscard]] Vector residuals(const Vector& h) const {
+    Vector out(count);
+    for (std::size_t i = 0; i < count; ++i) out[i] = std::abs(residual(i, h));
+    return out;
   }
 };
+
+// From `first` on, in four sums, of which none waits for the last product.
+double product_of(const Vector& a, const Vector& b, std::size_t first) {
+  std::array<double, 4> sums{};
+  std::size_t r = first;
+  for (; r + 4 <= a.size(); r += 4)
+    for (std::size_t k = 0; k < 4; ++k) sums[k] += a[r + k] * b[r + k];
+  for (; r < a.size(); ++r) sums[0] += a[r] * b[r];
+  return (sums[0] + sums[1]) + (sums[2] + sums[3]);
+}
 
 // Least squares by Householder's reflections. a: [column][row], the last column is the right-hand side.
 Vector least_squares(std::vector<Vector>& a) {
   const std::size_t columns = a.size() - 1, rows = a[0].size();
   Vector diagonal(columns);
   for (std::size_t k = 0; k < columns; ++k) {
-    double norm = 0;
-    for (std::size_t r = k; r < rows; ++r) norm += a[k][r] * a[k][r];
-    norm = std::copysign(std::sqrt(norm), -a[k][k]);
+    const double norm = std::copysign(std::sqrt(product_of(a[k], a[k], k)), -a[k][k]);
     diagonal[k] = norm;
     a[k][k] -= norm;  // the reflection's vector, of squared length -2 norm a[k][k]
     for (std::size_t c = k + 1; c <= columns; ++c) {
-      double product = 0;
-      for (std::size_t r = k; r < rows; ++r) product += a[k][r] * a[c][r];
-      product /= norm * a[k][k];
+      const double product = product_of(a[k], a[c], k) / (norm * a[k][k]);
       for (std::size_t r = k; r < rows; ++r) a[c][r] += product * a[k][r];
     }
   }
@@ -185,14 +192,15 @@ std::vector<double> least_error_taps(const TapTask& task, double enough) {
   double least = HUGE_VAL;
   for (int round = 0; round < 30 && least > enough; ++round) {
     const Vector h = weighted_taps(rows, weight);
-    const double largest = rows.largest_residual(h);
+    const Vector residuals = rows.residuals(h);
+    const double largest = *std::ranges::max_element(residuals);
     if (largest < least) {
       least = largest;
       best = h;
     }
     double sum = 0;
     for (std::size_t i = 0; i < rows.count; ++i) {
-      weight[i] = std::max(weight[i] * std::abs(rows.residual(i, h)) / largest, 1e-12);
+      weight[i] = std::max(weight[i] * residuals[i] / largest, 1e-12);
       sum += weight[i];
     }
     for (double& w : weight) w /= sum;

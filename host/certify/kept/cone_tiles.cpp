@@ -7,6 +7,8 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <numeric>
+#include <ranges>
 #include <tuple>
 
 #include "host/base/opencl/work_groups.hpp"
@@ -185,6 +187,21 @@ void ConeTiles::look_at_axis(std::size_t axis, const Coverage& coverage) {
   });
   for (const auto& part : at_parts_[axis])
     for (const ViewAtPart& view : part) band_[axis] = std::max(band_[axis], view.band);
+  // Those that see most of the highest frequencies first: a filter errs by about the band to its taps there.
+  constexpr int steep = 20;
+  const auto score = [&](const std::vector<ViewAtPart>& part) {
+    double sum = 0;
+    for (const ViewAtPart& view : part) sum += view.weight * std::pow(view.band / band_[axis], steep);
+    return sum;
+  };
+  std::vector<double> scores(parts.size());
+  parallel_for(std::ssize(parts), {}, "", [&](std::int64_t i) { scores[at(i)] = score(at_parts_[axis][at(i)]); });
+  std::vector<std::size_t> order(parts.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_sort(order, std::greater<>{}, [&](std::size_t i) { return scores[i]; });
+  std::vector<std::vector<ViewAtPart>> sorted;
+  for (const std::size_t i : order) sorted.push_back(std::move(at_parts_[axis][i]));
+  at_parts_[axis] = std::move(sorted);
 }
 
 // --- tables ---
@@ -379,19 +396,46 @@ ConeTiles::Known& ConeTiles::known(std::size_t axis, const GoldFilter& filter) {
 double ConeTiles::largest(std::size_t axis, const GoldFilter& filter) {
   Known& of_filter = known(axis, filter);
   std::optional<double>& found = of_filter.largest[axis];
-  if (!found) found = largest(axis, of_filter.error, false);
+  if (!found) found = largest(axis, of_filter.error);
   return *found;
 }
 
-// The largest sum over the views of what a filter errs along an axis.
-double ConeTiles::largest(std::size_t axis, const ProjectiveError& error, bool of_parallel) const {
+// The largest sum over the views of what a filter errs along an axis. Errors grow with bands and with how lambda
+// does: a part's largest of both bound its sum, and most parts lie below the largest sum by that.
+double ConeTiles::largest(std::size_t axis, const ProjectiveError& error) const {
   const auto& parts = at_parts_[axis];
-  std::vector<double> sums(parts.size(), 0.0);
-  parallel_for(static_cast<std::int64_t>(parts.size()), {}, "", [&](std::int64_t i) {
+  std::vector<std::pair<double, std::size_t>> order(parts.size());
+  parallel_for(std::ssize(parts), {}, "", [&](std::int64_t i) {
+    ViewAtPart most{};
     for (const ViewAtPart& view : parts[at(i)])
-      sums[at(i)] += view.weight * error.at(view.band, of_parallel ? 0.0 : view.rho);
+      most = {most.weight + view.weight, std::max(most.band, view.band), std::max(most.rho, std::abs(view.rho))};
+    order[at(i)] = {most.weight * error.at(most.band, most.rho) * (1 + 1e-12), at(i)};
   });
-  return (sums.empty() ? 0.0 : *std::ranges::max_element(sums)) * (1 + 1e-12);
+  std::ranges::sort(order, std::greater<>{});
+  double largest = 0;
+  constexpr std::int64_t together = 16;
+  for (std::int64_t first = 0; first < std::ssize(order) && order[at(first)].first > largest;
+       first += together) {
+    std::vector<double> sums(at(std::min(together, std::ssize(order) - first)), 0.0);
+    parallel_for(std::ssize(sums), {}, "", [&](std::int64_t i) {
+      for (const ViewAtPart& view : parts[order[at(first + i)].second])
+        sums[at(i)] += view.weight * error.at(view.band, view.rho);
+    });
+    largest = std::max(largest, *std::ranges::max_element(sums));
+  }
+  return largest * (1 + 1e-12);
+}
+
+// At most that, of filters whose error grows with the band: of the first parts, as if no view grew.
+double ConeTiles::least_of(std::size_t axis, const ProjectiveError& error) const {
+  constexpr std::size_t some = 8;
+  double largest = 0;
+  for (const auto& part : at_parts_[axis] | std::views::take(some)) {
+    double sum = 0;
+    for (const ViewAtPart& view : part) sum += view.weight * error.at(view.band, 0);
+    largest = std::max(largest, sum);
+  }
+  return largest;
 }
 
 ConeTiles::BestFilter ConeTiles::best_filter(int phases, std::size_t axis, int taps) {
@@ -416,7 +460,7 @@ ConeTiles::BestFilter ConeTiles::best_filter(int phases, std::size_t axis, int t
   parallel_for(std::ssize(shares), {}, "", [&](std::int64_t i) {
     GoldFilter filter = design_gold_filter(phases, shares[at(i)] * highest(axis), taps);
     const ProjectiveError of_parallel(filter, highest(axis), bands, 1);
-    const double least = along([&](std::size_t a) { return largest(a, of_parallel, true); });
+    const double least = along([&](std::size_t a) { return least_of(a, of_parallel); });
     proposals[at(i)] = {least, at(i), std::move(filter)};
   });
   std::ranges::sort(proposals, std::less<>{});

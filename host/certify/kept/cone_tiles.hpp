@@ -115,8 +115,8 @@ class ConeTiles {
     constexpr double least = 0.05;  // a single row does not vary along z
     return std::max(least, axis == 2 ? band_[2] : std::max(band_[0], band_[1]));
   }
-  /// `of_parallel`: as if no view grew along the axis, at most what they err.
-  [[nodiscard]] double largest(std::size_t axis, const ProjectiveError& error, bool of_parallel) const;
+  [[nodiscard]] double largest(std::size_t axis, const ProjectiveError& error) const;
+  [[nodiscard]] double least_of(std::size_t axis, const ProjectiveError& error) const;
   /// The same of a filter, found once.
   double largest(std::size_t axis, const GoldFilter& filter);
   [[nodiscard]] std::vector<double> bands_seen(std::size_t axis) const;

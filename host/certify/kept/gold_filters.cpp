@@ -6,7 +6,11 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <map>
+#include <mutex>
 #include <span>
+#include <tuple>
+#include <utility>
 
 #include "host/certify/bounds/tap_design.hpp"
 #include "vdvr/error.hpp"
@@ -30,17 +34,41 @@ double design_band(const GoldFilter& filter) {
   return std::max(filter.band, 4 * std::atan(std::pow(1e-8, 1.0 / filter.taps)));
 }
 
-// `phase` of the filter, with its mirror image; the middle one is its own.
-void design_phase(GoldFilter& filter, int phase) {
-  const double place = static_cast<double>(phase) / filter.rate;
+// A phase: its taps, and what it errs.
+struct Phase {
+  std::vector<float> taps;
+  double error = 0, sup = 0, norm = 0;
+};
+
+Phase design_phase(const GoldFilter& filter, double place) {
   const std::vector<double> h = least_error_taps({filter.taps, place, design_band(filter), 0});
-  const auto taps = static_cast<std::size_t>(filter.taps);
-  float* const here = filter.weights.data() + static_cast<std::size_t>(phase) * taps;
-  float* const mirrored = filter.weights.data() + static_cast<std::size_t>(filter.rate - phase) * taps;
+  const std::size_t taps = h.size();
+  Phase out;
+  NodeFunctional at{{}, filter.first() - place, 0};
   for (std::size_t i = 0; i < taps; ++i) {
-    const double tap = 2 * phase == filter.rate ? (h[i] + h[taps - 1 - i]) / 2 : h[i];
-    here[i] = mirrored[taps - 1 - i] = static_cast<float>(tap);
+    out.taps.push_back(static_cast<float>(place == 0.5 ? (h[i] + h[taps - 1 - i]) / 2 : h[i]));
+    at.taps.push_back(static_cast<double>(out.taps.back()));
+    out.norm += std::abs(at.taps.back());
   }
+  out.error = largest_symbol_error(at, filter.band);
+  out.sup = sup_constant(at, filter.band);
+  return out;
+}
+
+// Filters of several rates for a band share places: those of the last few bands are remembered.
+Phase known_phase(const GoldFilter& filter, double place) {
+  constexpr std::size_t most = 1024;
+  static std::mutex mutex;
+  static std::map<std::tuple<int, double, double>, Phase> known;
+  const std::tuple key{filter.taps, filter.band, place};
+  {
+    const std::scoped_lock lock(mutex);
+    if (const auto found = known.find(key); found != known.end()) return found->second;
+  }
+  Phase made = design_phase(filter, place);
+  const std::scoped_lock lock(mutex);
+  if (known.size() >= most) known.clear();
+  return known.emplace(key, std::move(made)).first->second;
 }
 
 // Largest sum of magnitudes, over positions of the finer lattice, of the difference of its interpolants.
@@ -81,13 +109,13 @@ GoldFilter design_gold_filter(int rate, double band, int taps) {
   filter.weights.assign(static_cast<std::size_t>(rate * taps), 0.0F);
   filter.weights[static_cast<std::size_t>(-filter.first())] = 1;
   for (int phase = 1; 2 * phase <= rate; ++phase) {
-    design_phase(filter, phase);
-    const NodeFunctional at = functional(filter, phase);
-    filter.error = std::max(filter.error, largest_symbol_error(at, band));
-    filter.sup = std::max(filter.sup, sup_constant(at, band));
-    double norm = 0;
-    for (const double h : at.taps) norm += std::abs(h);
-    filter.norm = std::max(filter.norm, norm);
+    const Phase made = known_phase(filter, static_cast<double>(phase) / rate);
+    const auto row = [&](int p) { return filter.weights.begin() + std::ptrdiff_t{p} * taps; };
+    std::ranges::reverse_copy(made.taps, row(rate - phase));  // mirrored; the middle one is its own
+    std::ranges::copy(made.taps, row(phase));
+    filter.error = std::max(filter.error, made.error);
+    filter.sup = std::max(filter.sup, made.sup);
+    filter.norm = std::max(filter.norm, made.norm);
   }
   filter.second_difference = difference_norm(filter, std::array{1.0, -2.0, 1.0});
   filter.fourth_difference = difference_norm(filter, std::array{1.0, -4.0, 6.0, -4.0, 1.0});

@@ -13,8 +13,6 @@ namespace {
 
 // Bands for which constants are known, evenly spaced. Beyond so many moments, magnitudes.
 constexpr std::size_t bands = 24, moments = most_moments;
-// Sums of fewer than a thousand products of numbers >= 0, in double precision.
-constexpr double rounding = 1 + 0x1p-40;
 
 std::vector<double> all_bands(double highest) {
   std::vector<double> out;
@@ -58,37 +56,32 @@ std::size_t ProjectiveError::place_of(double band) const {
       std::clamp(std::ceil(band / highest_ * bands - 1), 0.0, static_cast<double>(bands - 1)));
 }
 
-double ProjectiveError::constant(std::size_t moment, std::size_t place, double magnitude) const {
-  if (moment >= constants_[place].size()) return moment == 0 ? HUGE_VAL : magnitude;
-  const double known = constants_[place][moment];
-  return moment == 0 ? known : std::min(known, magnitude);
-}
-
 double ProjectiveError::at(double band, double rho) const {
   if (constants_.empty()) return 0;
   const double growth = std::abs(rho) * reach_;
   if (!(band <= highest_ * (1 + 1e-12)) || !(growth < 0.5)) return HUGE_VAL;
-  // Terms fall at last like those of exp(band reach growth / (1 - growth)) (1 - growth)^-2, which all of
-  // them, by magnitudes, add up to.
+  // All terms by magnitude add up to `all`. Where a moment's constant is known, a term is less than that: what
+  // they are less is taken off. Terms beyond these keep their magnitudes, and so do those of some 1e-13 of the
+  // whole, where an error is 1e-7 at least.
   const double exponent = band * reach_ * growth / (1 - growth);
-  // What is cut off is added by magnitude, some 1e-12 of the whole, where an error is 1e-7 at least.
   const double all = norm_ * std::exp(exponent) / ((1 - growth) * (1 - growth)), negligible = 0x1p-44 * all;
-  const std::size_t place = place_of(band);
-  double sum = 0, magnitudes = 0;
+  const std::vector<double>& known = constants_[place_of(band)];
+  if (known.empty()) return HUGE_VAL;
+  double less = norm_ - known[0];  // which may be more, as bounds are
   double of_m = 1, power_m = norm_;  // (|rho| band)^m / m!, and norm reach^2m
-  for (int m = 0; of_m * power_m > negligible; ++m) {
+  for (std::size_t m = 0; 2 * m < known.size() && of_m * power_m > negligible; ++m) {
     double of_i = of_m, power = power_m;  // times C(m + 1 + i, i) |rho|^i, and reach^i
-    for (int i = 0; of_i * power > negligible; ++i) {
-      sum += of_i * constant(static_cast<std::size_t>(2 * m + i), place, power);
-      magnitudes += of_i * power;
-      of_i *= std::abs(rho) * (m + 2 + i) / (i + 1);
+    for (std::size_t i = 0; 2 * m + i < known.size() && of_i * power > negligible; ++i) {
+      if (m + i > 0) less += of_i * std::max(0.0, power - known[2 * m + i]);
+      of_i *= std::abs(rho) * static_cast<double>(m + 2 + i) / static_cast<double>(i + 1);
       power *= reach_;
     }
-    of_m *= std::abs(rho) * band / (m + 1);
+    of_m *= std::abs(rho) * band / static_cast<double>(m + 1);
     power_m *= reach_ * reach_;
   }
-  // What is left; the difference rounds by some u of `all`.
-  return (sum + std::max(0.0, all - magnitudes) + all * 0x1p-44) * rounding;
+  // At most 81 terms of at most 90 roundings each, whose sum is at most `all`; the exponent, at most 38, of eight:
+  // fewer than 500 u of `all`.
+  return all - less + all * 0x1p-44;
 }
 
 }  // namespace vdvr

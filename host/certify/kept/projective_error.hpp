@@ -29,8 +29,6 @@ class ProjectiveError {
 
  private:
   [[nodiscard]] std::size_t place_of(double band) const;
-  // `magnitude`: what it is at most whatever the band.
-  [[nodiscard]] double constant(std::size_t moment, std::size_t band, double magnitude) const;
 
   double highest_ = 0, reach_ = 0, norm_ = 0;
   std::vector<std::vector<double>> constants_;  // [band][moment]; none of a copy
