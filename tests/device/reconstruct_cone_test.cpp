@@ -173,7 +173,8 @@ BOOST_AUTO_TEST_CASE(vectors_of_any_length_give_the_same) {
     Upsampler upsampler(state, filtered);
     std::vector<std::vector<float>> results;
     for (const int rate : {1, 2}) {
-      const ConeTable table = cone_table(state, filtered, upsampler, rate, {1, 1}, 0, shape.views);
+      const ConeTable table =
+          cone_table(state, filtered, upsampler, rate, {1, -1, shape.rows}, 0, shape.views);
       const ConeBand band{&grid,
                           0,
                           n[1],

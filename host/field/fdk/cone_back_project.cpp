@@ -20,7 +20,7 @@ namespace {
 constexpr std::int64_t longest_vector = 16;
 // Pixels that a vector may lie between, beyond which single lanes are faster.
 constexpr int most_spans = 10;
-// Rows beyond the margins on either side: a vector with a lane that is wanted begins as many rows below, and
+// Rows beyond those on either side: a vector with a lane that is wanted begins as many rows below, and
 // ends as many above.
 constexpr std::int64_t rows_of_vectors = longest_vector + most_spans + 4;
 // Alike of a single lane, which reads two.
@@ -29,9 +29,7 @@ constexpr int views_together = 8;
 // Of fewer planes most lanes would be idle.
 constexpr std::int64_t fewest_planes = 4;
 
-std::int64_t rows_around(const ConeMargins& margins) {
-  return margins.rows + (margins.vectors ? rows_of_vectors : rows_of_lane);
-}
+std::int64_t rows_around(const ConeReach& reach) { return reach.vectors ? rows_of_vectors : rows_of_lane; }
 
 std::int64_t mirrored(std::int64_t i, std::int64_t n) {
   const std::int64_t period = 2 * n, m = ((i % period) + period) % period;
@@ -43,10 +41,9 @@ struct TableShape {
   std::int64_t rows, row_stride;
 };
 
-TableShape shape_of(const FilteredScan& scan, int rate, const ConeMargins& margins) {
-  const ParallelGeometry& g = scan.geometry;
-  TableShape s{upsampled_columns(g.columns, rate, static_cast<double>(margins.columns)),
-               (g.rows - 1 + 2 * rows_around(margins)) * rate + 1, 0};
+TableShape shape_of(const FilteredScan& scan, int rate, const ConeReach& reach) {
+  TableShape s{upsampled_columns(scan.geometry.columns, rate, static_cast<double>(reach.columns)),
+               (reach.last_row - reach.first_row + 2 * rows_around(reach)) * rate + 1, 0};
   // Of each phase; vectors read past the last row.
   s.row_stride = rate * column_stride((s.rows + rate - 1) / rate + longest_vector);
   return s;
@@ -185,25 +182,25 @@ bool planes_suit_vectors(const FilteredScan& scan, const Grid& grid) {
   });
 }
 
-std::uint64_t cone_table_bytes(const FilteredScan& scan, int rate, const ConeMargins& margins,
+std::uint64_t cone_table_bytes(const FilteredScan& scan, int rate, const ConeReach& reach,
                                std::int64_t views) {
-  const TableShape s = shape_of(scan, rate, margins);
+  const TableShape s = shape_of(scan, rate, reach);
   return sizeof(float) * count(views) * count(s.columns.count) * count(s.row_stride);
 }
 
 ConeTable cone_table(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, int rate,
-                     const ConeMargins& margins, std::int64_t first, std::int64_t views) {
-  const TableShape s = shape_of(scan, rate, margins);
+                     const ConeReach& reach, std::int64_t first, std::int64_t views) {
+  const TableShape s = shape_of(scan, rate, reach);
   ConeTable table{{},
                   rate,
                   s.columns.count,
                   s.rows,
                   s.row_stride,
                   s.columns.position(0),
-                  -static_cast<double>(rows_around(margins)),
+                  static_cast<double>(reach.first_row - rows_around(reach)),
                   first,
                   views,
-                  margins.vectors};
+                  reach.vectors};
   table.values =
       opencl::DeviceArray<float>(state, count(views * s.columns.count * s.row_stride), "filtered views");
   if (rate == 1) copy_pixels(scan, table);

@@ -20,9 +20,10 @@ struct ConeTable {
   bool vectors = true;  ///< of planes may read it
 };
 
-/// How many columns and rows of a table are mirrored on each side, in pixels.
-struct ConeMargins {
-  std::int64_t columns = 0, rows = 0;
+/// What samples that are wanted see of the detector, in pixels: a table has no more.
+struct ConeReach {
+  std::int64_t columns = 0;                  ///< beyond the detector on each side, mirrored
+  std::int64_t first_row = 0, last_row = 0;  ///< mirrored beyond it
   bool vectors = true;  ///< of planes may read it: they reach further along rows than single ones
 };
 
@@ -31,8 +32,8 @@ bool planes_suit_vectors(const FilteredScan& scan, const Grid& grid);
 
 /// Views [first, first + count). Cost: rate 1: a copy; else as Upsampler's. `upsampler`: of the same scan.
 ConeTable cone_table(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, int rate,
-                     const ConeMargins& margins, std::int64_t first, std::int64_t count);
-std::uint64_t cone_table_bytes(const FilteredScan& scan, int rate, const ConeMargins& margins,
+                     const ConeReach& reach, std::int64_t first, std::int64_t count);
+std::uint64_t cone_table_bytes(const FilteredScan& scan, int rate, const ConeReach& reach,
                                std::int64_t views);
 
 /// Samples of `grid` with x, all rows from `first_y` and planes from `first_z`.

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <span>
 
 #include "host/base/opencl/host_memory.hpp"
 #include "host/base/system/casts.hpp"
@@ -24,21 +26,6 @@ namespace {
 // Samples that may share a cell with the covered region are kept.
 double kept_distance(const Grid& grid) {
   return std::hypot(grid.spacing[0], grid.spacing[1], grid.spacing[2]) * (1 + 1e-6);
-}
-
-// Pixels beyond the detector that kept samples fall on: the margin where it looks largest, closest to a
-// source.
-ConeMargins margins_of(const FilteredScan& scan, const Grid& grid) {
-  double columns = 0, rows = 0;
-  for (const ViewMatrix& matrix : scan.views) {
-    const ConeView view = cone_view(matrix);
-    // Covered points lie at least as far from the source's plane as the nearer edge of what it sees of the
-    // axis' cylinder; a margin that is small beside that is seen at no more than twice the pitch at the axis.
-    columns = std::max(columns, 2 * kept_distance(grid) / view.pitch_u);
-    rows = std::max(rows, 2 * kept_distance(grid) / view.pitch_v);
-  }
-  return {static_cast<std::int64_t>(std::ceil(columns)) + 1, static_cast<std::int64_t>(std::ceil(rows)) + 1,
-          planes_suit_vectors(scan, grid)};
 }
 
 // The planes of a slab that are kept of each column.
@@ -63,6 +50,60 @@ std::vector<std::array<std::int32_t, 2>> kept_planes(const ConeCoverage& coverag
   return kept;
 }
 
+// Detector rows that the kept samples of a view see, least and largest: these lie within the hull of the ends
+// of rows of columns, in the first plane and the last, whose images hold those of all. Nothing where that is
+// not known.
+std::optional<std::array<double, 2>> rows_seen(const ViewMatrix& view, const Grid& grid,
+                                               std::span<const std::array<std::int64_t, 2>> ends) {
+  std::array<double, 2> rows{HUGE_VAL, -HUGE_VAL};
+  for (std::int64_t y = 0; y < std::ssize(ends); ++y) {
+    if (ends[at(y)][0] > ends[at(y)][1]) continue;
+    for (const std::int64_t x : ends[at(y)])
+      for (const std::int64_t z : {std::int64_t{0}, grid.samples()[2] - 1}) {
+        const Vec3 seen = projected(view, grid.position({x, y, z}));
+        if (!(seen[2] > 0)) return std::nullopt;
+        rows = {std::min(rows[0], seen[1]), std::max(rows[1], seen[1])};
+      }
+  }
+  return rows;
+}
+
+// Pixels that kept samples fall on. Beyond the detector: the margin where it looks largest, closest to a
+// source.
+ConeReach reach_of(const FilteredScan& scan, const ConeCoverage& coverage, const Grid& grid) {
+  double columns = 0, rows = 0;
+  for (const ViewMatrix& matrix : scan.views) {
+    const ConeView view = cone_view(matrix);
+    // Covered points lie at least as far from the source's plane as the nearer edge of what it sees of the
+    // axis' cylinder; a margin that is small beside that is seen at no more than twice the pitch at the axis.
+    columns = std::max(columns, 2 * kept_distance(grid) / view.pitch_u);
+    rows = std::max(rows, 2 * kept_distance(grid) / view.pitch_v);
+  }
+  const Index3 n = grid.samples();
+  std::vector<std::array<std::int64_t, 2>> ends(at(n[1]), {n[0], -1});
+  const auto kept = kept_planes(coverage, grid, 0, n[2]);
+  for (std::int64_t i = 0; i < std::ssize(kept); ++i)
+    if (kept[at(i)][0] <= kept[at(i)][1]) {
+      auto& [first, last] = ends[at(i / n[0])];
+      first = std::min(first, i % n[0]);
+      last = std::max(last, i % n[0]);
+    }
+  const auto beyond = static_cast<double>(static_cast<std::int64_t>(std::ceil(rows)) + 1),
+             most = static_cast<double>(scan.geometry.rows - 1) + beyond;
+  std::vector<std::array<double, 2>> seen(scan.views.size());
+  parallel_for(std::ssize(seen), {}, "", [&](std::int64_t k) {
+    seen[at(k)] = rows_seen(scan.views[at(k)], grid, ends).value_or(std::array{-beyond, most});
+  });
+  double low = most, high = -beyond;
+  for (const auto& [least, largest] : seen) {
+    low = std::min(low, std::max(least, -beyond));
+    high = std::max(high, std::min(largest, most));
+  }
+  return {static_cast<std::int64_t>(std::ceil(columns)) + 1,
+          static_cast<std::int64_t>(std::floor(std::min(low, high))),
+          static_cast<std::int64_t>(std::ceil(high)), planes_suit_vectors(scan, grid)};
+}
+
 // What lies outside is 0: vectors compute more than is wanted.
 void clear_unwanted(std::span<float> columns, std::int64_t stride, std::int64_t nz,
                     std::span<const std::array<std::int32_t, 2>> wanted) {
@@ -81,7 +122,7 @@ struct Sizes {
 constexpr std::uint64_t enough_bytes = std::uint64_t{128} << 20;
 
 // A slab's planes and a band's columns take a quarter of what is left each, views another.
-Sizes sizes_for(const opencl::State& state, const FilteredScan& scan, int rate, const ConeMargins& margins,
+Sizes sizes_for(const opencl::State& state, const FilteredScan& scan, int rate, const ConeReach& reach,
                 const Index3& n, std::uint64_t plane_bytes) {
   const std::uint64_t share = std::min(state.memory.left() / 4, state.info.max_allocation);
   Sizes s{};
@@ -94,7 +135,7 @@ Sizes sizes_for(const opencl::State& state, const FilteredScan& scan, int rate, 
   s.band = most(sizeof(float) * count(n[0] * column_stride(std::max<std::int64_t>(s.planes, 1))), n[1]);
   if (s.band > VDVR_CONE_BLOCK && s.band < n[1]) s.band = s.band / VDVR_CONE_BLOCK * VDVR_CONE_BLOCK;
   // Upsampled views pass through a slab of their own.
-  const std::uint64_t per_view = cone_table_bytes(scan, rate, margins, 1) * (rate == 1 ? 1 : 2);
+  const std::uint64_t per_view = cone_table_bytes(scan, rate, reach, 1) * (rate == 1 ? 1 : 2);
   s.views = most(per_view, scan.geometry.views());
   // Where no table is made twice, small ones do: they are no faster for being large.
   if (s.planes == n[2] && s.band == n[1])
@@ -127,9 +168,9 @@ void back_project_views(opencl::State& state, const FilteredScan& filtered, cons
                         int depth_power, const Planes& planes, const Progress& progress, StageWatch& watch) {
   const ParallelGeometry& g = filtered.geometry;
   const ConeCoverage coverage(filtered.views, g.columns, g.rows);
-  const ConeMargins margins = margins_of(filtered, grid);
+  const ConeReach reach = reach_of(filtered, coverage, grid);
   const Index3 n = grid.samples();
-  const Sizes sizes = sizes_for(state, filtered, rate, margins, n, planes.bytes);
+  const Sizes sizes = sizes_for(state, filtered, rate, reach, n, planes.bytes);
   HostMemory host(state);
   host.count(filtered.samples.resident_bytes(), "the filtered projections");
   Upsampler upsampler(state, filtered);
@@ -154,7 +195,7 @@ void back_project_views(opencl::State& state, const FilteredScan& filtered, cons
         const std::int64_t views = std::min(sizes.views, g.views() - first);
         if (!table || table->first_view != first || table->views != views) {
           table.reset();
-          table = cone_table(state, filtered, upsampler, rate, margins, first, views);
+          table = cone_table(state, filtered, upsampler, rate, reach, first, views);
           watch.lap(state, "upsample");
         }
         band.adds = first > 0;
