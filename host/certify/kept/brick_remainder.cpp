@@ -31,6 +31,9 @@ constexpr std::int64_t difference_reach = 2;
 // fp32: up to nine terms with weights that add to 16, in units of u times the largest value.
 constexpr double difference_rounding = 64;
 
+// Room for eight lanes that begin at the last node of the last brick.
+std::int64_t stride_of(const GoldBox& box) { return column_stride(box.nodes[2] + 8); }
+
 }  // namespace
 
 BrickRemainder::BrickRemainder(opencl::State& state, KeptGold& kept, const FilteredScan& scan,
@@ -195,11 +198,22 @@ void BrickRemainder::will_require(const std::vector<std::uint8_t>& selected) {
   kept_.will_read(nodes_, boxes(open(selected)));
 }
 
+// Some blocks are launched one after another before the first is asked for: a CPU waits for no answer, and a
+// card does not run dry.
 void BrickRemainder::look_at(std::span<const Block> blocks, const Progress& progress) {
+  constexpr std::size_t together = 8;
   kept_.prepare(nodes_, boxes(blocks), progress);
-  for (std::size_t i = 0; i < blocks.size(); ++i) {
-    look_at(blocks[i].first, blocks[i].bricks);
-    report(progress, "remainder", static_cast<double>(i + 1) / static_cast<double>(blocks.size()));
+  std::uint64_t room = 0;
+  for (const GoldBox& box : boxes(blocks)) room = std::max(room, room_for(box));
+  opencl::DeviceArray<float> gold(state_, room, "gold of bricks");
+  gold.fill(0.0f);  // what is not written does not count, but must be finite
+  for (std::size_t first = 0; first < blocks.size(); first += together) {
+    const auto some = blocks.subspan(first, std::min(together, blocks.size() - first));
+    std::vector<opencl::DeviceArray<float>> found;
+    for (const Block& block : some) found.push_back(launch(block, gold));
+    for (std::size_t i = 0; i < some.size(); ++i) take(some[i], found[i].to_host());
+    report(progress, "remainder",
+           static_cast<double>(first + some.size()) / static_cast<double>(blocks.size()));
   }
 }
 
@@ -317,12 +331,15 @@ std::pair<int, int> BrickRemainder::heights_read(const GoldBox& box) const {
   return read;
 }
 
-void BrickRemainder::look_at(const Index3& first, const Index3& bricks) {
+std::uint64_t BrickRemainder::room_for(const GoldBox& box) {
+  return count(box.nodes[0] * box.nodes[1] * stride_of(box));
+}
+
+// Enqueues; what is found are six numbers a brick. `gold` may be another block's afterwards.
+opencl::DeviceArray<float> BrickRemainder::launch(const Block& block, opencl::DeviceArray<float>& gold) {
+  const auto& [first, bricks] = block;
   const GoldBox box = box_of(first, bricks);
-  // Room for eight lanes that begin at the last node of the last brick.
-  const std::int64_t stride = column_stride(box.nodes[2] + 8);
-  opencl::DeviceArray<float> gold(state_, count(box.nodes[0] * box.nodes[1] * stride), "gold of bricks");
-  gold.fill(0.0f);
+  const std::int64_t stride = stride_of(box);
   kept_.fill(nodes_, box, gold, 0, stride);
   std::vector<float> margins(at(box.nodes[0] * box.nodes[1]));
   const auto place = [&](std::int64_t node, std::size_t a) {
@@ -335,8 +352,7 @@ void BrickRemainder::look_at(const Index3& first, const Index3& bricks) {
           static_cast<float>(coverage_.margin_above(place(x, 0), place(y, 1), 2 * lowest_));
   });
   const auto margin = opencl::copied<float>(state_, margins, "coverage margins");
-  const opencl::DeviceArray<float> out(state_, count(bricks[0] * bricks[1] * bricks[2] * 6),
-                                       "fourth differences");
+  opencl::DeviceArray<float> out(state_, count(bricks[0] * bricks[1] * bricks[2] * 6), "fourth differences");
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrFourthDifferences, cl::LocalSpaceArg> kernel(
       state_, "certify/kept/fourth_differences", "fourth_differences",
       opencl::height_defines(state_.info, 8));
@@ -348,7 +364,7 @@ void BrickRemainder::look_at(const Index3& first, const Index3& bricks) {
                                side(2), to_int(box.nodes[0]), to_int(stride), first_z, last_z,
                                static_cast<float>(lowest_)},
          opencl::shared_room(state_.info));
-  take({first, bricks}, out.to_host());
+  return out;
 }
 
 float BrickRemainder::of(std::int64_t brick, const GoldLattice& lattice) const {

@@ -62,7 +62,8 @@ class BrickRemainder {
   [[nodiscard]] std::size_t slot(const Index3& position) const;
   [[nodiscard]] GoldBox box_of(const Index3& first, const Index3& bricks) const;
   [[nodiscard]] std::vector<GoldBox> boxes(std::span<const Block> blocks) const;
-  void look_at(const Index3& first, const Index3& bricks);
+  [[nodiscard]] static std::uint64_t room_for(const GoldBox& box);
+  [[nodiscard]] opencl::DeviceArray<float> launch(const Block& block, opencl::DeviceArray<float>& gold);
   template <class Visit>
   void for_each_block(Visit&& visit) const;
   template <class Visit>
