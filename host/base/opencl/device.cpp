@@ -153,11 +153,6 @@ void BufferPool::clear() {
   bytes_ = 0;
 }
 
-State::~State() {
-  // Kernels may still run, and writes read what is staged.
-  if (queue() != nullptr) clFinish(queue());
-}
-
 cl::Buffer State::allocate(std::uint64_t bytes, const std::string& what) {
   if (bytes > info.max_allocation) {
     throw ResourceError(fmt::format(
@@ -441,6 +436,8 @@ Device& Device::operator=(Device&& other) noexcept {
   }
   return *this;
 }
+
+void Device::build_ahead(const std::string& purpose) { state_->build_ahead(purpose); }
 
 const DeviceInfo& Device::info() const { return state_->info; }
 std::uint64_t Device::memory_left() const { return state_->memory.left(); }

@@ -7,13 +7,18 @@
 // the field a compiler that we never saw may warn of what is right.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <atomic>
 #include <cstdlib>
 #include <set>
 #include <sstream>
+#include <thread>
 
 #include "host/base/opencl/embedded.hpp"
 #include "host/base/opencl/state.hpp"
+#include "host/base/system/cache_files.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/hash.hpp"
 #include "vdvr/expert/stop.hpp"
 
 namespace vdvr::opencl {
@@ -59,31 +64,144 @@ std::string build_options(const Defines& defines) {
   return options;
 }
 
-const cl::Program& program(State& state, const std::string& name, const Defines& defines) {
-  const std::string options = build_options(defines);
-  const std::string cache_key = name + ' ' + options;
-  const std::lock_guard guard(state.programs_lock_);
-  if (const auto found = state.programs_.find(cache_key); found != state.programs_.end())
-    return found->second;
-
-  cl::Program built;
+const cl::Program& State::built(const std::string& name, const Defines& defines) {
+  const std::string options = build_options(defines), key = name + ' ' + options;
+  const auto known = [&]() -> const cl::Program* {
+    const std::lock_guard guard(programs_lock_);
+    const auto found = programs_.find(key);
+    return found == programs_.end() ? nullptr : &found->second;
+  };
+  if (const cl::Program* const there = known()) return *there;
+  const std::lock_guard building(building_lock_);
+  if (const cl::Program* const there = known()) return *there;
+  cl::Program program;
   try {
-    built = cl::Program(state.context, resolve_source(name + ".cl"));
-    built.build({state.device}, options.c_str());
+    program = cl::Program(context, resolve_source(name + ".cl"));
+    program.build({device}, options.c_str());
   } catch (const cl::Error& e) {
     // LLVM's own handler removes the files of a compilation that a signal interrupts, which then fails.
     throw_if_stopped();
     std::string log;
     try {
-      log = built.getBuildInfo<CL_PROGRAM_BUILD_LOG>(state.device);
+      log = program.getBuildInfo<CL_PROGRAM_BUILD_LOG>(device);
     } catch (const cl::Error&) {
       log = "(no log)";
     }
     throw BuildError(fmt::format("kernel program '{}' does not build on '{}' with options '{}': {} {}\n{}",
-                                 name, state.info.name, options, e.what(), code_name(e.err()), log));
+                                 name, info.name, options, e.what(), code_name(e.err()), log));
   }
-  if (state.on_program) state.on_program(name, defines);
-  return state.programs_.emplace(cache_key, std::move(built)).first->second;
+  const std::lock_guard guard(programs_lock_);
+  return programs_.emplace(key, std::move(program)).first->second;
+}
+
+const cl::Program& program(State& state, const std::string& name, const Defines& defines) {
+  const cl::Program& built = state.built(name, defines);
+  const std::lock_guard guard(state.programs_lock_);
+  const std::pair wanted{name, defines};
+  if (std::ranges::find(state.asked_for_, wanted) == state.asked_for_.end()) {
+    state.asked_for_.push_back(wanted);
+    if (state.on_program) state.on_program(name, defines);
+  }
+  return built;
+}
+
+// --- ahead ---
+
+namespace {
+
+constexpr const char* list_head = "vdvr: programs of kernels that were asked for\n";
+constexpr std::size_t most_ahead = 256;
+
+// A program a line: its name, and its defines.
+std::string listed(const std::vector<std::pair<std::string, Defines>>& programs) {
+  std::string text = list_head;
+  for (const auto& [name, defines] : programs) {
+    text += name;
+    for (const auto& [key, value] : defines) text += fmt::format(" {}={}", key, value);
+    text += '\n';
+  }
+  return text + "end\n";
+}
+
+std::vector<std::pair<std::string, Defines>> programs_of(const std::string& text) {
+  std::vector<std::pair<std::string, Defines>> out;
+  if (!text.starts_with(list_head) || !text.ends_with("\nend\n")) return out;
+  std::istringstream lines(text.substr(std::string_view(list_head).size()));
+  for (std::string line; std::getline(lines, line) && line != "end" && out.size() < most_ahead;) {
+    std::istringstream words(line);
+    std::pair<std::string, Defines> program;
+    words >> program.first;
+    for (std::string word; words >> word;) {
+      const std::size_t at = word.find('=');
+      if (at == std::string::npos || !word.starts_with("VDVR_")) return {};
+      program.second.emplace_back(word.substr(0, at), word.substr(at + 1));
+    }
+    out.push_back(std::move(program));
+  }
+  return out;
+}
+
+}  // namespace
+
+// Builds, on a thread of its own, what a list of the cache folder names, and writes the list anew at the end.
+class ProgramsAhead {
+ public:
+  ProgramsAhead(State& state, std::string file) : state_(state), file_(std::move(file)) {
+    read_ = read_cached(file_).value_or("");
+    std::vector<std::pair<std::string, Defines>> programs = programs_of(read_);
+    if (programs.empty()) return;
+    try {
+      thread_ = std::thread([this, list = std::move(programs)] { build(list); });
+    } catch (const std::exception&) {  // no thread to be had: programs are built when they are asked for
+    }
+  }
+  ~ProgramsAhead() {
+    stop_ = true;
+    if (thread_.joinable()) thread_.join();
+    try {
+      const std::string text = listed(state_.asked_for_);
+      if (!state_.asked_for_.empty() && text != read_) write_cached(file_, text);
+    } catch (const std::exception&) {  // no memory: the last list stays
+    }
+  }
+  ProgramsAhead(const ProgramsAhead&) = delete;
+  ProgramsAhead& operator=(const ProgramsAhead&) = delete;
+
+ private:
+  void build(const std::vector<std::pair<std::string, Defines>>& programs) noexcept {
+    try {
+      for (const auto& [name, defines] : programs) {
+        if (stop_) return;
+        state_.built(name, defines);
+      }
+    } catch (...) {  // whoever asks for it is told
+    }
+  }
+
+  State& state_;
+  std::string file_, read_;
+  std::atomic<bool> stop_ = false;
+  std::thread thread_;
+};
+
+void State::build_ahead(const std::string& purpose) {
+  // It reads a program with all of the language's functions before it looks for it in its cache: 20 ms each.
+  if (info.platform != "Portable Computing Language" || ahead_) return;
+  const cl::Platform platform(device.getInfo<CL_DEVICE_PLATFORM>());
+  {
+    const std::lock_guard guard(programs_lock_);
+    asked_for_.clear();
+  }
+  ahead_ = std::make_unique<ProgramsAhead>(
+      *this,
+      "programs/" + sha256_of_text(fmt::format("{}\n{}\n{}\n{}", purpose, info.name,
+                                               platform.getInfo<CL_PLATFORM_VERSION>(), VDVR_VERSION)));
+}
+
+State::~State() {
+  ahead_ = nullptr;
+  // Kernels may still run, and writes read what is staged.
+  if (queue() != nullptr) clFinish(queue());
 }
 
 std::optional<ReadyKernel> KernelPool::take(const std::string& key) {

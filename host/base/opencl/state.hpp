@@ -124,6 +124,8 @@ struct Launched {
   std::chrono::steady_clock::time_point at = std::chrono::steady_clock::now();
 };
 
+class ProgramsAhead;
+
 /// Shared by the Device and by what may outlive it.
 struct State : std::enable_shared_from_this<State> {
   ~State();  // waits for what is enqueued
@@ -154,12 +156,17 @@ struct State : std::enable_shared_from_this<State> {
   /// So far, each piece counted.
   [[nodiscard]] std::uint64_t launches();
 
-  /// Told of each program that was built, by the thread that built it, which holds a lock. Set before kernels
-  /// are made, and by the thread that makes them.
+  /// Told of each program when it is asked for first, by the thread that asks, which holds a lock. Set before
+  /// kernels are made, and by the thread that makes them.
   std::function<void(const std::string& name, const Defines&)> on_program;
+
+  /// Device::build_ahead().
+  void build_ahead(const std::string& purpose);
 
  private:
   friend const cl::Program& program(State&, const std::string&, const Defines&);
+  friend class ProgramsAhead;
+  const cl::Program& built(const std::string& name, const Defines& defines);
 
   std::mutex pool_lock_;  // the account's own may be taken under it
   BufferPool pool_;
@@ -167,8 +174,11 @@ struct State : std::enable_shared_from_this<State> {
   std::deque<Launched> in_flight_;
   double in_flight_seconds_ = 0;
   std::map<std::string, Pace> paces_;  // by program, kernel and defines
+  std::mutex building_lock_;           // one program at a time, and not of programs_, for which others wait
   std::mutex programs_lock_;
-  std::map<std::string, cl::Program> programs_;  // by name and defines
+  std::map<std::string, cl::Program> programs_;             // by name and defines
+  std::vector<std::pair<std::string, Defines>> asked_for_;  // each once
+  std::unique_ptr<ProgramsAhead> ahead_;
 };
 
 /// "CL_OUT_OF_RESOURCES (-5)".

@@ -185,7 +185,8 @@ std::vector<double> coefficient_sums(const NodeFunctional& f, const std::vector<
   for (std::size_t n = 0; n < moments; ++n) {
     transform.forward(g[n]);
     double sum = 0;
-    for (const Complex& a : g[n]) sum += std::abs(a.real()) / series_samples;  // real, since e(-kappa) = e(kappa)*
+    for (const Complex& a : g[n])
+      sum += std::abs(a.real()) / series_samples;  // real, since e(-kappa) = e(kappa)*
     // Errors of the samples and of the FFT, in the 2-norm: sum |a_j| <= sqrt(samples) times the norm of all
     // a_j.
     const double noise = std::sqrt(double{series_samples}) * 8 * rounding(f, magnitude(f, n, end));

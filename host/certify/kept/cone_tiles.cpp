@@ -195,7 +195,8 @@ void ConeTiles::look_at_axis(std::size_t axis, const Coverage& coverage) {
     return sum;
   };
   std::vector<double> scores(parts.size());
-  parallel_for(std::ssize(parts), {}, "", [&](std::int64_t i) { scores[at(i)] = score(at_parts_[axis][at(i)]); });
+  parallel_for(std::ssize(parts), {}, "",
+               [&](std::int64_t i) { scores[at(i)] = score(at_parts_[axis][at(i)]); });
   std::vector<std::size_t> order(parts.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::ranges::stable_sort(order, std::greater<>{}, [&](std::size_t i) { return scores[i]; });
@@ -400,15 +401,16 @@ double ConeTiles::largest(std::size_t axis, const GoldFilter& filter) {
   return *found;
 }
 
-// The largest sum over the views of what a filter errs along an axis. Errors grow with bands and with how lambda
-// does: a part's largest of both bound its sum, and most parts lie below the largest sum by that.
+// The largest sum over the views of what a filter errs along an axis. Errors grow with bands and with how
+// lambda does: a part's largest of both bound its sum, and most parts lie below the largest sum by that.
 double ConeTiles::largest(std::size_t axis, const ProjectiveError& error) const {
   const auto& parts = at_parts_[axis];
   std::vector<std::pair<double, std::size_t>> order(parts.size());
   parallel_for(std::ssize(parts), {}, "", [&](std::int64_t i) {
     ViewAtPart most{};
     for (const ViewAtPart& view : parts[at(i)])
-      most = {most.weight + view.weight, std::max(most.band, view.band), std::max(most.rho, std::abs(view.rho))};
+      most = {most.weight + view.weight, std::max(most.band, view.band),
+              std::max(most.rho, std::abs(view.rho))};
     order[at(i)] = {most.weight * error.at(most.band, most.rho) * (1 + 1e-12), at(i)};
   });
   std::ranges::sort(order, std::greater<>{});

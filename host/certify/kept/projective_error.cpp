@@ -60,14 +60,14 @@ double ProjectiveError::at(double band, double rho) const {
   if (constants_.empty()) return 0;
   const double growth = std::abs(rho) * reach_;
   if (!(band <= highest_ * (1 + 1e-12)) || !(growth < 0.5)) return HUGE_VAL;
-  // All terms by magnitude add up to `all`. Where a moment's constant is known, a term is less than that: what
-  // they are less is taken off. Terms beyond these keep their magnitudes, and so do those of some 1e-13 of the
-  // whole, where an error is 1e-7 at least.
+  // All terms by magnitude add up to `all`. Where a moment's constant is known, a term is less than that:
+  // what they are less is taken off. Terms beyond these keep their magnitudes, and so do those of some 1e-13
+  // of the whole, where an error is 1e-7 at least.
   const double exponent = band * reach_ * growth / (1 - growth);
   const double all = norm_ * std::exp(exponent) / ((1 - growth) * (1 - growth)), negligible = 0x1p-44 * all;
   const std::vector<double>& known = constants_[place_of(band)];
   if (known.empty()) return HUGE_VAL;
-  double less = norm_ - known[0];  // which may be more, as bounds are
+  double less = norm_ - known[0];    // which may be more, as bounds are
   double of_m = 1, power_m = norm_;  // (|rho| band)^m / m!, and norm reach^2m
   for (std::size_t m = 0; 2 * m < known.size() && of_m * power_m > negligible; ++m) {
     double of_i = of_m, power = power_m;  // times C(m + 1 + i, i) |rho|^i, and reach^i
@@ -79,8 +79,8 @@ double ProjectiveError::at(double band, double rho) const {
     of_m *= std::abs(rho) * band / static_cast<double>(m + 1);
     power_m *= reach_ * reach_;
   }
-  // At most 81 terms of at most 90 roundings each, whose sum is at most `all`; the exponent, at most 38, of eight:
-  // fewer than 500 u of `all`.
+  // At most 81 terms of at most 90 roundings each, whose sum is at most `all`; the exponent, at most 38, of
+  // eight: fewer than 500 u of `all`.
   return all - less + all * 0x1p-44;
 }
 
