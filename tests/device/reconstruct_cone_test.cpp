@@ -237,6 +237,43 @@ BOOST_AUTO_TEST_CASE(memory_decides_slabs_and_chunks_and_not_values) {
   BOOST_TEST(largest > 0);
 }
 
+// A table has the rows that the planes see: all of the detector for all of the planes, few for one.
+BOOST_AUTO_TEST_CASE(some_planes_have_the_samples_that_they_have_among_all) {
+  std::vector<ConeShape> shapes;
+  for (const auto& [name, orbit] : cone_orbits()) shapes.push_back(orbit);
+  ConeShape tall{.views = 40, .rows = 90, .columns = 24, .source_to_axis = 50};
+  shapes.push_back(tall);
+  tall.in_plane_deg = 2;
+  shapes.push_back(tall);
+  for (const ConeShape& shape : shapes) {
+    const ProjectionSet scan = noisy_cone(shape);
+    const Grid grid = make_grid(scan, {});
+    const Index3 n = grid.samples();
+    Device device;
+    const FilteredScan filtered = filter_cone(device.state(), scan, {});
+    for (const int upsampling : {1, 2}) {
+      const Volume all = reconstructed(scan, grid, upsampling);
+      const double allowed =
+          2 * rounding(filtered, 0.6, upsampling == 1 ? slope_of_pixels : slope_of_series(filtered));
+      double worst = 0, largest = 0;
+      for (const std::int64_t first : {std::int64_t{0}, n[2] / 3, n[2] / 2, n[2] - 6}) {
+        Grid some = grid;
+        some.cells[2] = first == n[2] / 3 ? 5 : 1;
+        some.origin[2] = grid.position({0, 0, first})[2];
+        const Volume planes = reconstructed(scan, some, upsampling);
+        const auto offset = static_cast<std::size_t>(first * n[0] * n[1]);
+        for (std::size_t i = 0; i < planes.samples.size(); ++i) {
+          const auto expected = static_cast<double>(all.samples[offset + i]);
+          worst = std::max(worst, std::abs(static_cast<double>(planes.samples[i]) - expected));
+          largest = std::max(largest, std::abs(expected));
+        }
+      }
+      BOOST_TEST(worst <= allowed);
+      BOOST_TEST(largest > 5 * allowed);
+    }
+  }
+}
+
 BOOST_AUTO_TEST_CASE(a_detector_upside_down_sees_the_same_object) {
   const ConeShape shape;
   const ProjectionSet scan = noisy_cone(shape);

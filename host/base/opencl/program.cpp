@@ -64,6 +64,11 @@ std::string build_options(const Defines& defines) {
   return options;
 }
 
+std::size_t State::programs() {
+  const std::lock_guard guard(programs_lock_);
+  return programs_.size();
+}
+
 const cl::Program& State::built(const std::string& name, const Defines& defines) {
   const std::string options = build_options(defines), key = name + ' ' + options;
   const auto known = [&]() -> const cl::Program* {

@@ -162,6 +162,8 @@ struct State : std::enable_shared_from_this<State> {
 
   /// Device::build_ahead().
   void build_ahead(const std::string& purpose);
+  /// How many programs are built.
+  [[nodiscard]] std::size_t programs();
 
  private:
   friend const cl::Program& program(State&, const std::string&, const Defines&);
