@@ -391,12 +391,13 @@ BOOST_AUTO_TEST_CASE(bounds_go_with_the_powers_of_the_spacings) {
 BOOST_AUTO_TEST_CASE(a_brick_asked_for_alone_has_the_bound_that_it_has_among_all) {
   const ProjectionSet noise = testing::noise_scan(15, 9, 33, 1);
   attacks::Chain chain(noise);
-  const Grid grid = grid_in({20, 12, 8}, {1, 1, 1}, {-4, -6, -4});
+  const Grid grid =
+      grid_in({52, 20, 20}, {0.6, 0.6, 0.4}, {-15, -6, -4});  // sixteen blocks: more than go together
   const GoldSettings settings = settings_of(grid, 2);
   const Bricks bricks(grid, 2);
   GoldSource all(device().state(), chain.filtered, chain.sups, settings);
   all.remainder->require(std::vector<std::uint8_t>(static_cast<std::size_t>(bricks.size()), 1), {});
-  for (std::int64_t brick = 0; brick < bricks.size(); brick += 37) {
+  for (std::int64_t brick = 0; brick < bricks.size(); brick += 197) {
     GoldSource one(device().state(), chain.filtered, chain.sups, settings);
     std::vector<std::uint8_t> selected(static_cast<std::size_t>(bricks.size()), 0);
     selected[static_cast<std::size_t>(brick)] = 1;
