@@ -128,7 +128,7 @@ Planned read_and_plan(Device& device, const Arguments& args, const Wanted& asked
   Wanted wanted = asked;
   Planned planned;
   planned.scan = load_scan(args.path("IN"), args, wanted.options.field, progress, &planned.understood);
-  device.build_ahead(fmt::format("{}, {}", args.who(), planned.scan.cone ? "cone beam" : "parallel beam"));
+  build_ahead(device, args, planned.scan);
   choose_tolerance(planned, wanted, args);
   if (seen) seen(planned);
   const auto plan = [&] {

@@ -77,7 +77,7 @@ int verify_command(Arguments& args) {
   const ProjectionSet scan = load_scan_to_verify(projections, args, certificate, progress.callback());
   check_projections(projections, scan, certificate);
   Device device = open_device(common);
-  device.build_ahead(fmt::format("{}, {}", args.who(), scan.cone ? "cone beam" : "parallel beam"));
+  build_ahead(device, args, scan);
   VerifyOptions options;
   options.exhaustive = args.has("exhaustive");
   const FileVerification result = verify_file(device, file, scan, options, progress.callback());

@@ -153,6 +153,12 @@ void BufferPool::clear() {
   bytes_ = 0;
 }
 
+State::~State() {
+  ahead_ = nullptr;  // its thread builds for this context
+  // Kernels may still run, and writes read what is staged.
+  if (queue() != nullptr) clFinish(queue());
+}
+
 cl::Buffer State::allocate(std::uint64_t bytes, const std::string& what) {
   if (bytes > info.max_allocation) {
     throw ResourceError(fmt::format(

@@ -197,16 +197,10 @@ void State::build_ahead(const std::string& purpose) {
     const std::lock_guard guard(programs_lock_);
     asked_for_.clear();
   }
-  ahead_ = std::make_unique<ProgramsAhead>(
+  ahead_ = std::make_shared<ProgramsAhead>(
       *this,
       "programs/" + sha256_of_text(fmt::format("{}\n{}\n{}\n{}", purpose, info.name,
                                                platform.getInfo<CL_PLATFORM_VERSION>(), VDVR_VERSION)));
-}
-
-State::~State() {
-  ahead_ = nullptr;
-  // Kernels may still run, and writes read what is staged.
-  if (queue() != nullptr) clFinish(queue());
 }
 
 std::optional<ReadyKernel> KernelPool::take(const std::string& key) {

@@ -180,7 +180,7 @@ struct State : std::enable_shared_from_this<State> {
   std::mutex programs_lock_;
   std::map<std::string, cl::Program> programs_;             // by name and defines
   std::vector<std::pair<std::string, Defines>> asked_for_;  // each once
-  std::unique_ptr<ProgramsAhead> ahead_;
+  std::shared_ptr<ProgramsAhead> ahead_;
 };
 
 /// "CL_OUT_OF_RESOURCES (-5)".

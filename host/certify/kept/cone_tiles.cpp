@@ -401,8 +401,9 @@ double ConeTiles::largest(std::size_t axis, const GoldFilter& filter) {
   return *found;
 }
 
-// The largest sum over the views of what a filter errs along an axis. Errors grow with bands and with how
-// lambda does: a part's largest of both bound its sum, and most parts lie below the largest sum by that.
+// At least the largest sum over the views of what a filter errs along an axis. Errors grow with bands and
+// with how lambda does: bounds at a part's largest of both hold for all of its views, and most parts lie
+// below the largest sum by that.
 double ConeTiles::largest(std::size_t axis, const ProjectiveError& error) const {
   const auto& parts = at_parts_[axis];
   std::vector<std::pair<double, std::size_t>> order(parts.size());
@@ -428,7 +429,7 @@ double ConeTiles::largest(std::size_t axis, const ProjectiveError& error) const 
   return largest * (1 + 1e-12);
 }
 
-// At most that, of filters whose error grows with the band: of the first parts, as if no view grew.
+// What proposals are ordered by: about the least that it can be, of the first parts as if no view grew.
 double ConeTiles::least_of(std::size_t axis, const ProjectiveError& error) const {
   constexpr std::size_t some = 8;
   double largest = 0;

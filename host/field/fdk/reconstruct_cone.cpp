@@ -68,6 +68,20 @@ std::optional<std::array<double, 2>> rows_seen(const ViewMatrix& view, const Gri
   return rows;
 }
 
+// By row of columns, the first and last that have a kept sample.
+std::vector<std::array<std::int64_t, 2>> ends_of_rows(const ConeCoverage& coverage, const Grid& grid) {
+  const Index3 n = grid.samples();
+  std::vector<std::array<std::int64_t, 2>> ends(at(n[1]), {n[0], -1});
+  const auto kept = kept_planes(coverage, grid, 0, n[2]);
+  for (std::int64_t i = 0; i < std::ssize(kept); ++i) {
+    if (kept[at(i)][0] > kept[at(i)][1]) continue;
+    auto& [first, last] = ends[at(i / n[0])];
+    first = std::min(first, i % n[0]);
+    last = std::max(last, i % n[0]);
+  }
+  return ends;
+}
+
 // Pixels that kept samples fall on. Beyond the detector: the margin where it looks largest, closest to a
 // source.
 ConeReach reach_of(const FilteredScan& scan, const ConeCoverage& coverage, const Grid& grid) {
@@ -79,25 +93,16 @@ ConeReach reach_of(const FilteredScan& scan, const ConeCoverage& coverage, const
     columns = std::max(columns, 2 * kept_distance(grid) / view.pitch_u);
     rows = std::max(rows, 2 * kept_distance(grid) / view.pitch_v);
   }
-  const Index3 n = grid.samples();
-  std::vector<std::array<std::int64_t, 2>> ends(at(n[1]), {n[0], -1});
-  const auto kept = kept_planes(coverage, grid, 0, n[2]);
-  for (std::int64_t i = 0; i < std::ssize(kept); ++i)
-    if (kept[at(i)][0] <= kept[at(i)][1]) {
-      auto& [first, last] = ends[at(i / n[0])];
-      first = std::min(first, i % n[0]);
-      last = std::max(last, i % n[0]);
-    }
-  const auto beyond = static_cast<double>(static_cast<std::int64_t>(std::ceil(rows)) + 1),
-             most = static_cast<double>(scan.geometry.rows - 1) + beyond;
+  const double least = -std::ceil(rows) - 1, most = static_cast<double>(scan.geometry.rows - 1) - least;
+  const auto ends = ends_of_rows(coverage, grid);
   std::vector<std::array<double, 2>> seen(scan.views.size());
   parallel_for(std::ssize(seen), {}, "", [&](std::int64_t k) {
-    seen[at(k)] = rows_seen(scan.views[at(k)], grid, ends).value_or(std::array{-beyond, most});
+    seen[at(k)] = rows_seen(scan.views[at(k)], grid, ends).value_or(std::array{least, most});
   });
-  double low = most, high = -beyond;
-  for (const auto& [least, largest] : seen) {
-    low = std::min(low, std::max(least, -beyond));
-    high = std::max(high, std::min(largest, most));
+  double low = most, high = least;
+  for (const auto& [first, last] : seen) {
+    low = std::min(low, std::max(first, least));
+    high = std::max(high, std::min(last, most));
   }
   return {static_cast<std::int64_t>(std::ceil(columns)) + 1,
           static_cast<std::int64_t>(std::floor(std::min(low, high))),
