@@ -147,14 +147,17 @@ Trial try_rates(opencl::State& state, GoldRates& gold, const Volume& base, doubl
   const auto selected = trial_bricks(settings.grid, settings.granularity, settings.rate, looked_at);
   const opencl::DeviceArray<std::uint8_t> device_selected(state, std::span<const std::uint8_t>(selected),
                                                           "trial bricks");
-  stream.run(
+  const auto look_at = [&](const BrickMeasure& m) {
+    if (m.total < 0) return;
+    const double share = by_brick.empty() ? 1.0 : static_cast<double>(by_brick[at(m.brick)]);
+    t.slack = std::max(t.slack, static_cast<double>(m.slack) / share);
+  };
+  stream.run_in_lanes(
       selected,
-      [&](GoldStream::Batch& batch) {
-        for (const BrickMeasure& m : batch.measure(field, static_cast<float>(epsilon), device_selected))
-          if (m.total >= 0)
-            t.slack =
-                std::max(t.slack, static_cast<double>(m.slack) /
-                                      (by_brick.empty() ? 1.0 : static_cast<double>(by_brick[at(m.brick)])));
+      [&](GoldStream::Batch& batch) -> Take {
+        return [&, found = batch.measure(field, static_cast<float>(epsilon), device_selected)] {
+          std::ranges::for_each(found, look_at);
+        };
       },
       {}, "trial");
   t.gold = std::max(0.0, t.slack - t.projection);

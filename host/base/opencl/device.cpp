@@ -7,6 +7,7 @@
 #include <array>
 #include <atomic>
 #include <bit>
+#include <charconv>
 #include <cctype>
 #include <iterator>
 #include <stdexcept>
@@ -153,10 +154,64 @@ void BufferPool::clear() {
   bytes_ = 0;
 }
 
+State::State(State* main)
+    : info(main->info),
+      device(main->device),
+      context(main->context),
+      queue(context, device, CL_QUEUE_PROFILING_ENABLE),
+      memory(main->memory),
+      kernels(main->kernels),
+      longest_launch(main->longest_launch),
+      main_(*main) {}
+
 State::~State() {
   ahead_ = nullptr;  // its thread builds for this context
+  lanes_.clear();
   // Kernels may still run, and writes read what is staged.
   if (queue() != nullptr) clFinish(queue());
+}
+
+State& State::lane(std::size_t number) {
+  const std::lock_guard guard(pool_lock_);
+  try {
+    while (lanes_.size() <= number) lanes_.push_back(std::make_unique<State>(this));
+  } catch (const cl::Error& e) {
+    throw DeviceError(fmt::format("another queue on '{}': {}", info.name, code_name(e.err())));
+  }
+  return *lanes_[number];
+}
+
+// A card hides the host's work behind others' kernels, a CPU the ends of launches too, where its threads run
+// dry. PoCL before 6.0 counts the users of a kernel that it holds for one size down for another size that was
+// launched after it, and aborts at 0 (pocl_release_dlhandle_cache). 3.1 counts each twice up: two may run.
+int State::most_lanes() const {
+  if (info.platform != pocl_platform) return info.is_cpu ? 2 : 4;
+  double version = 0;
+  std::from_chars(info.driver.data(), info.driver.data() + info.driver.size(), version);
+  return version == 3.1 || version >= 6 ? 2 : 1;
+}
+
+void State::wait_for(State& other) {
+  try {
+    cl::Event so_far;
+    other.queue.enqueueMarkerWithWaitList(nullptr, &so_far);
+    other.queue.flush();
+    const std::vector<cl::Event> events{so_far};
+    queue.enqueueBarrierWithWaitList(&events);
+  } catch (const cl::Error& e) {
+    throw DeviceError(fmt::format("waiting for another queue of '{}': {}", info.name, code_name(e.err())));
+  }
+}
+
+std::uint64_t State::kept_bytes() const {
+  std::uint64_t bytes = pool_.bytes();
+  for (const auto& lane : lanes_) bytes += lane->pool_.bytes();
+  return bytes;
+}
+
+void State::clear_pools() {
+  pool_.clear();
+  for (const auto& lane : lanes_) lane->pool_.clear();
 }
 
 cl::Buffer State::allocate(std::uint64_t bytes, const std::string& what) {
@@ -166,11 +221,11 @@ cl::Buffer State::allocate(std::uint64_t bytes, const std::string& what) {
         bytes, info.name, info.max_allocation));
   }
   const std::uint64_t size = pooled_size(bytes);
-  const std::lock_guard guard(pool_lock_);
+  const std::lock_guard guard(main_.pool_lock_);
   cl::Buffer buffer = pool_.take(bytes);
-  // What the pool keeps is in use as well: it goes first when room is short.
-  if (memory.left() < size + pool_.bytes()) pool_.clear();
-  memory.take(size, what, pool_.bytes());
+  // What pools keep is in use as well: it goes first when room is short.
+  if (memory.left() < size + main_.kept_bytes()) main_.clear_pools();
+  memory.take(size, what, main_.kept_bytes());
   if (buffer() != nullptr) return buffer;
   try {
     return cl::Buffer(context, CL_MEM_READ_WRITE, size);
@@ -184,16 +239,16 @@ cl::Buffer State::allocate(std::uint64_t bytes, const std::string& what) {
 void State::release(std::uint64_t bytes, cl::Buffer buffer) noexcept {
   memory.give(pooled_size(bytes));
   try {
-    const std::lock_guard guard(pool_lock_);
+    const std::lock_guard guard(main_.pool_lock_);
     pool_.keep(bytes, std::move(buffer));
   } catch (...) {  // no memory for the pool's own entry: the buffer is simply freed
   }
 }
 
 void State::take_host(std::uint64_t bytes, const std::string& what) {
-  const std::lock_guard guard(pool_lock_);
-  if (memory.host_left() < bytes + pool_.bytes()) pool_.clear();
-  memory.take_host(bytes, what, pool_.bytes());
+  const std::lock_guard guard(main_.pool_lock_);
+  if (memory.host_left() < bytes + main_.kept_bytes()) main_.clear_pools();
+  memory.take_host(bytes, what, main_.kept_bytes());
 }
 
 }  // namespace opencl

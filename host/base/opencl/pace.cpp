@@ -106,14 +106,14 @@ void State::keep_pace(Launched latest, bool wait) {
 }
 
 Pace& State::pace_of(const std::string& kernel) {
-  const std::lock_guard guard(pace_lock_);
-  return paces_[kernel];
+  const std::lock_guard guard(main_.pace_lock_);
+  return main_.paces_[kernel];
 }
 
 std::uint64_t State::launches() {
-  const std::lock_guard guard(pace_lock_);
+  const std::lock_guard guard(main_.pace_lock_);
   std::uint64_t all = 0;
-  for (const auto& [kernel, pace] : paces_) all += pace.launches();
+  for (const auto& [kernel, pace] : main_.paces_) all += pace.launches();
   return all;
 }
 

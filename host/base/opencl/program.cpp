@@ -99,7 +99,8 @@ const cl::Program& State::built(const std::string& name, const Defines& defines)
   return programs_.emplace(key, std::move(program)).first->second;
 }
 
-const cl::Program& program(State& state, const std::string& name, const Defines& defines) {
+const cl::Program& program(State& of_lane, const std::string& name, const Defines& defines) {
+  State& state = of_lane.main_;
   const cl::Program& built = state.built(name, defines);
   const std::lock_guard guard(state.programs_lock_);
   const std::pair wanted{name, defines};
@@ -191,7 +192,7 @@ class ProgramsAhead {
 
 void State::build_ahead(const std::string& purpose) {
   // It reads a program with all of the language's functions before it looks for it in its cache: 20 ms each.
-  if (info.platform != "Portable Computing Language" || ahead_) return;
+  if (info.platform != pocl_platform || ahead_) return;
   const cl::Platform platform(device.getInfo<CL_DEVICE_PLATFORM>());
   {
     const std::lock_guard guard(programs_lock_);

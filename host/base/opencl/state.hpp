@@ -1,6 +1,6 @@
 // What a Device holds: context, in-order queue, program cache, and the account of our allocations. Threads
 // may share it: OpenCL's own calls are safe, whatever else changes stands behind locks. A cl::Kernel is not,
-// so that each launcher has its own.
+// so that each launcher has its own. Threads that should not wait for each other take a lane of it each.
 #pragma once
 
 #include <chrono>
@@ -124,20 +124,36 @@ struct Launched {
   std::chrono::steady_clock::time_point at = std::chrono::steady_clock::now();
 };
 
+/// Some of what follows is for its faults.
+inline constexpr const char* pocl_platform = "Portable Computing Language";
+
 class ProgramsAhead;
 
 /// Shared by the Device and by what may outlive it.
 struct State : std::enable_shared_from_this<State> {
+  State() : memory(own_memory_), main_(*this) {}
+  /// lane() alone makes them.
+  explicit State(State* main);
   ~State();  // waits for what is enqueued
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
 
   DeviceInfo info;
   cl::Device device;
   cl::Context context;
   cl::CommandQueue queue;
-  MemoryAccount memory;
+  MemoryAccount& memory;
   Staging staging;
   /// Shared with launchers, which may outlive the state.
   std::shared_ptr<KernelPool> kernels = std::make_shared<KernelPool>();
+
+  /// A queue beside this one, with arrays of its own in the pool, so that none is used again before its
+  /// kernels are over; all else is this one's. The same for the same number, and it lives as long as this.
+  State& lane(std::size_t number);
+  /// How many of them are of use, and safe, beside each other; 1: none but this.
+  [[nodiscard]] int most_lanes() const;
+  /// What is enqueued here from now on begins when all that is enqueued there has ended.
+  void wait_for(State& other);
 
   /// An allocation of `bytes`, from the pool or new, counted. Throws ResourceError before anything is
   /// allocated.
@@ -169,8 +185,14 @@ struct State : std::enable_shared_from_this<State> {
   friend const cl::Program& program(State&, const std::string&, const Defines&);
   friend class ProgramsAhead;
   const cl::Program& built(const std::string& name, const Defines& defines);
+  // Of the pools of all lanes.
+  [[nodiscard]] std::uint64_t kept_bytes() const;
+  void clear_pools();
 
-  std::mutex pool_lock_;  // the account's own may be taken under it
+  MemoryAccount own_memory_;
+  State& main_;
+  std::vector<std::unique_ptr<State>> lanes_;
+  std::mutex pool_lock_;  // of the lanes and of their pools too; the account's own may be taken under it
   BufferPool pool_;
   std::mutex pace_lock_;
   std::deque<Launched> in_flight_;

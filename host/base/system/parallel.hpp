@@ -1,4 +1,4 @@
-// A loop over host threads whose progress and exceptions reach the caller, and which ends when a stop is
+// Loops over host threads whose progress and exceptions reach the caller, and which end when a stop is
 // requested.
 #pragma once
 
@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cstdint>
 #include <exception>
+#include <functional>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -52,5 +53,14 @@ void parallel_for(std::int64_t n, const Progress& progress, const std::string& s
   for (auto& t : pool) t.join();
   if (failure) std::rethrow_exception(failure);
 }
+
+/// What is left to do of one part of a loop once it is computed.
+using Take = std::function<void()>;
+
+/// compute(lane, i) for 0 <= i < n, in so many threads of their own at once: lane l computes l, l + lanes and
+/// so on, one after another. What each returns the calling thread calls, in the order of i; no lane is more
+/// than two parts ahead of it. Of one lane the calling thread does all.
+void in_lanes(std::int64_t n, std::int64_t lanes,
+              const std::function<Take(std::size_t lane, std::int64_t i)>& compute);
 
 }  // namespace vdvr

@@ -20,8 +20,10 @@ void compute_blocks(GoldStream& gold, const BlockPass& pass, const DeviceField* 
   }
   gold.run_works(
       works, pass.selected,
-      [&](GoldBatch& batch) {
-        on_record(compute_record(batch, pass, field, selected, gold.settings().rate));
+      [&](GoldBatch& batch) -> Take {
+        return [&on_record, record = compute_record(batch, pass, field, selected, gold.settings().rate)] {
+          on_record(record);
+        };
       },
       progress, stage, pass.purpose);
 }

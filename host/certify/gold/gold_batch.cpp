@@ -40,6 +40,8 @@ struct GoldBatch::TileRequest {
   cl_ulong offset;
 };
 
+GoldBatch::~GoldBatch() { clFinish(state_.queue()); }
+
 std::array<std::int64_t, 4> GoldBatch::place(std::int64_t brick) const { return place_.at(brick); }
 
 // Equal blocks by their first bricks in x and y, and the selected bricks in them.

@@ -50,6 +50,10 @@ struct BrickClass {
 
 class GoldBatch {
  public:
+  ~GoldBatch();  // waits for what is enqueued: gold is of another queue
+  GoldBatch(const GoldBatch&) = delete;
+  GoldBatch& operator=(const GoldBatch&) = delete;
+
   /// Bricks of the batch that lie in the grid and are selected.
   [[nodiscard]] const std::vector<std::int64_t>& bricks() const { return bricks_; }
   /// The first brick of each block, x, y, z, and bricks per block.
@@ -136,7 +140,7 @@ class GoldBatch {
   [[nodiscard]] opencl::Range columns_of_bricks(std::uint64_t bricks) const;
   [[nodiscard]] opencl::DeviceArray<cl_int4> places(const std::vector<std::int64_t>& bricks) const;
 
-  opencl::State& state_;
+  opencl::State& state_;  // a lane's, but of gold_
   const GoldSettings& settings_;
   std::int64_t bricks_x_ = 0, bricks_y_ = 0, bricks_z_ = 0;  // per block
   GoldBlocks shape_;

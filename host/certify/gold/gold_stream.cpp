@@ -155,7 +155,11 @@ void GoldStream::will_measure(const std::vector<std::uint8_t>& selected) {
 
 void GoldStream::run(const std::vector<std::uint8_t>& selected, const OnBatch& on_batch,
                      const Progress& progress, const std::string& stage, For purpose) {
-  run_works(works(selected, purpose), selected, on_batch, progress, stage, purpose);
+  const Compute compute = [&](Batch& batch) {
+    on_batch(batch);
+    return Take([] {});
+  };
+  run_parts(works(selected, purpose), selected, 1, compute, progress, stage);
 }
 
 std::vector<GoldStream::Work> GoldStream::works(const std::vector<std::uint8_t>& selected, For purpose) {
@@ -184,22 +188,44 @@ std::vector<std::uint8_t> GoldStream::bricks_of(std::span<const Work> works,
 }
 
 void GoldStream::run_works(std::span<const Work> works, const std::vector<std::uint8_t>& selected,
-                           const OnBatch& on_batch, const Progress& progress, const std::string& stage,
+                           const Compute& compute, const Progress& progress, const std::string& stage,
                            For purpose) {
   begin(purpose);
+  run_parts(works, selected, lanes_for(works), compute, progress, stage);
+}
+
+// Of what `begin` was called for.
+void GoldStream::run_parts(std::span<const Work> works, const std::vector<std::uint8_t>& selected,
+                           std::int64_t lanes, const Compute& compute, const Progress& progress,
+                           const std::string& stage) {
   source_->kept.prepare(lattice_, boxes(works), progress);
   if (!settings_.base_only) source_->remainder->require(bricks_of(works, selected), progress);
+  std::vector<Part> parts;
   double total = 0, done = 0;
-  Batch batch(state_, settings_);  // its arrays serve all works
-  for (const Work& w : works) total += cost(w);
   for (const Work& w : works) {
-    const double a_block = samples(w.width_x, w.width_y, w.height);
-    const auto tick = [&](double blocks) {
-      done += blocks * a_block;
+    total += cost(w);
+    std::ranges::copy(parts_of(w, lanes), std::back_inserter(parts));
+  }
+  Stopwatch watch(state_);
+  GoldSpent& spent = spent_[at(static_cast<std::int64_t>(purpose_))];
+  std::vector<std::unique_ptr<Batch>> batches(at(lanes));  // their arrays serve all works
+  for (std::size_t l = 0; l < batches.size(); ++l)
+    batches[l].reset(new Batch(lanes > 1 ? state_.lane(l) : state_, settings_));
+  std::mutex filling;
+  in_lanes(std::ssize(parts), lanes, [&](std::size_t lane, std::int64_t i) -> Take {
+    const Part& part = parts[at(i)];
+    fill(*batches[lane], part, selected, filling);
+    return [&, take = compute(*batches[lane])] {
+      take();
+      const Work& w = *part.work;
+      const double a_block = samples(w.width_x, w.width_y, w.height);
+      for (std::size_t b = 0; b < part.blocks; ++b)
+        spent.samples += a_block * kept_share(w, w.first[part.first + b]);
+      done += static_cast<double>(part.blocks) * a_block;
       report(progress, stage, std::min(1.0, done / total));
     };
-    run_blocks(batch, w, selected, on_batch, tick);
-  }
+  });
+  spent.seconds += watch.lap();
 }
 
 std::vector<std::uint8_t> bricks_near(const Coverage& coverage, const Grid& grid, std::int64_t g) {
@@ -253,8 +279,9 @@ std::vector<float> GoldStream::margins(const std::vector<std::array<std::int64_t
   return out;
 }
 
-// Sizes of a batch in a slab, and room for `together` blocks of it.
-std::int64_t GoldStream::begin_batch(Batch& batch, const Work& work, const SlabShape& slab) {
+// Sizes of a batch in a slab.
+void GoldStream::begin_batch(Batch& batch, const Work& work) const {
+  const SlabShape slab = slab_of(work);
   const Grid& grid = settings_.grid;
   const std::int64_t rate = settings_.rate;
   batch.slab_ = slab;
@@ -282,29 +309,52 @@ std::int64_t GoldStream::begin_batch(Batch& batch, const Work& work, const SlabS
       b.z_first = std::min(b.z_first, k);
       b.z_last = k;
     }
+}
 
-  const std::int64_t gold = (b.nx + 2 * halo_) * (b.ny + 2 * halo_), nodes = b.nx * b.ny * slab.stride;
-  const std::int64_t per_block = 4 * (gold * b.gold_stride + 4 * nodes);
-  // Blocks that go together are told of, launched and asked for together; what fits them takes as much again.
-  // A CPU has them in its caches; a card runs dry between small launches.
+// Blocks of a work that may go together, of all lanes: what fits them takes as much again. A CPU has them in
+// its caches; a card runs dry between small launches.
+std::int64_t GoldStream::together(const Work& work) const {
+  const std::int64_t side = std::int64_t{settings_.granularity} * settings_.rate,
+                     nodes = (work.width_x * side + 1) * (work.width_y * side + 1) * slab_of(work).stride,
+                     per_block =
+                         4 * (static_cast<std::int64_t>(samples(work.width_x, work.width_y, work.height)) +
+                              4 * nodes);
   const auto left = static_cast<std::int64_t>(state_.memory.left());
   const std::int64_t large = std::int64_t{256} << (state_.info.is_cpu ? 20 : 25),
                      wanted = std::max(std::min<std::int64_t>(64 << 20, left / 3), std::min(large, left / 8)),
-                     bytes = std::min(wanted, static_cast<std::int64_t>(state_.info.max_allocation)),
-                     together = std::clamp<std::int64_t>(bytes / per_block, 1,
-                                                         static_cast<std::int64_t>(work.first.size()));
-  const std::uint64_t samples = count(together * gold * b.gold_stride + gold_room);
+                     bytes = std::min(wanted, static_cast<std::int64_t>(state_.info.max_allocation));
+  return std::max<std::int64_t>(1, bytes / per_block);
+}
+
+// Host and device take turns in each: while one lane's results are looked at, the device has another's.
+std::int64_t GoldStream::lanes_for(std::span<const Work> works) const {
+  std::int64_t lanes = state_.most_lanes();
+  for (const Work& w : works) lanes = std::min(lanes, together(w));
+  return lanes;
+}
+
+std::vector<GoldStream::Part> GoldStream::parts_of(const Work& work, std::int64_t lanes) const {
+  const std::size_t most = at(together(work) / lanes);
+  std::vector<Part> out;
+  for (std::size_t first = 0; first < work.first.size(); first += most)
+    out.push_back({&work, first, std::min(most, work.first.size() - first)});
+  return out;
+}
+
+void GoldStream::require_room(Batch& batch, std::int64_t blocks) const {
+  const GoldBlocks& b = batch.shape_;
+  const std::int64_t columns = blocks * (b.nx + 2 * halo_) * (b.ny + 2 * halo_);
+  const std::uint64_t samples = count(columns * b.gold_stride + gold_room);
   if (batch.gold_.size() < samples) {
     batch.gold_ = {};  // before the next one is allocated
     batch.gold_ = opencl::DeviceArray<float>(state_, samples, "gold block");
     // What lies between columns, and beyond the last, is read and not used: let it be finite.
     batch.gold_.fill(0.0f);
   }
-  if (batch.margin_.size() < count(together * gold)) {
+  if (batch.margin_.size() < count(columns)) {
     batch.margin_ = {};
-    batch.margin_ = opencl::DeviceArray<float>(state_, count(together * gold), "coverage margins");
+    batch.margin_ = opencl::DeviceArray<float>(batch.state_, count(columns), "coverage margins");
   }
-  return together;
 }
 
 SlabShape GoldStream::slab_of(const Work& work) const {
@@ -317,38 +367,33 @@ SlabShape GoldStream::slab_of(const Work& work) const {
   return slab;
 }
 
-void GoldStream::take_addends(Batch& batch) {
+void GoldStream::take_addends(Batch& batch) const {
   const Finer own{lattice_, errors_, 1}, &of = purpose_ == For::proposing ? *finer_ : own;
   batch.take_addends(brick_addends(*source_->remainder, of.lattice, of.errors, settings_,
                                    batch.block_bricks(), batch.first_brick_),
                      of.errors, of.of_curvature);
 }
 
-void GoldStream::run_blocks(Batch& batch, const Work& work, const std::vector<std::uint8_t>& selected,
-                            const OnBatch& on_batch, const std::function<void(double)>& tick) {
-  Stopwatch watch(state_);
-  GoldSpent& spent = spent_[at(static_cast<std::int64_t>(purpose_))];
-  const std::int64_t together = begin_batch(batch, work, slab_of(work));
+void GoldStream::fill(Batch& batch, const Part& part, const std::vector<std::uint8_t>& selected,
+                      std::mutex& filling) {
+  const Work& work = *part.work;
+  const auto first = work.first.begin() + static_cast<std::ptrdiff_t>(part.first);
+  opencl::finish(batch.state_, "gold blocks");  // nothing reads its gold any more
+  begin_batch(batch, work);
+  require_room(batch, static_cast<std::int64_t>(part.blocks));
+  const std::vector<std::array<std::int64_t, 2>> blocks(first,
+                                                        first + static_cast<std::ptrdiff_t>(part.blocks));
+  batch.choose(blocks, work.z, selected);
   const std::int64_t nx = batch.shape_.nx + 2 * halo_, ny = batch.shape_.ny + 2 * halo_;
-  const std::uint64_t block = count(nx * ny * batch.shape_.gold_stride);
-  for (std::size_t begin = 0; begin < work.first.size(); begin += at(together)) {
-    const std::size_t n = std::min(at(together), work.first.size() - begin);
-    batch.choose({work.first.begin() + static_cast<std::ptrdiff_t>(begin),
-                  work.first.begin() + static_cast<std::ptrdiff_t>(begin + n)},
-                 work.z, selected);
-    batch.margins_ = margins(batch.first_brick_, nx, ny);
-    opencl::write_later<float>(state_, batch.margin_, batch.margins_, "coverage margins");
-    std::vector<GoldBox> boxes;
-    for (std::size_t b = 0; b < n; ++b) boxes.push_back(box(work, work.first[begin + b]));
-    source_->kept.fill(lattice_, boxes, batch.gold_, 0, block, batch.shape_.gold_stride);
-    if (!settings_.base_only) take_addends(batch);
-    on_batch(batch);
-    for (std::size_t b = 0; b < n; ++b)
-      spent.samples +=
-          samples(work.width_x, work.width_y, work.height) * kept_share(work, work.first[begin + b]);
-    tick(static_cast<double>(n));
-  }
-  spent.seconds += watch.lap();
+  batch.margins_ = margins(batch.first_brick_, nx, ny);
+  opencl::write_later<float>(batch.state_, batch.margin_, batch.margins_, "coverage margins");
+  std::vector<GoldBox> boxes;
+  for (const auto& block : blocks) boxes.push_back(box(work, block));
+  if (!settings_.base_only) take_addends(batch);
+  const std::lock_guard guard(filling);
+  source_->kept.fill(lattice_, boxes, batch.gold_, 0, count(nx * ny * batch.shape_.gold_stride),
+                     batch.shape_.gold_stride);
+  if (&batch.state_ != &state_) batch.state_.wait_for(state_);
 }
 
 namespace {

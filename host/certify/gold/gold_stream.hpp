@@ -9,12 +9,14 @@
 #include <array>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "host/base/opencl/kernel.hpp"
+#include "host/base/system/parallel.hpp"
 #include "host/certify/bounds/projection_bounds.hpp"
 #include "host/certify/gold/gold_settings.hpp"
 #include "host/certify/gold/gold_source.hpp"
@@ -54,6 +56,9 @@ class GoldStream {
   /// The blocks of one batch on the device, as handed to the callback.
   using Batch = GoldBatch;
   using OnBatch = std::function<void(Batch&)>;
+  /// Computes something of a batch in a thread of its own, others beside it, so that the device need not wait
+  /// for the host. What it returns the caller's thread calls, in the order of the blocks.
+  using Compute = std::function<Take(Batch&)>;
 
   /// Every brick of the grid (or those selected), in large blocks, slab by slab. `selected` is by brick; a
   /// block without a selected brick is skipped, and one with few is cut to smaller ones around them. Fitted
@@ -73,7 +78,11 @@ class GoldStream {
   [[nodiscard]] std::vector<Work> works(const std::vector<std::uint8_t>& selected, For purpose);
   /// Some of them, `selected` and `purpose` as there: a block is the same whoever else is computed.
   void run_works(std::span<const Work> works, const std::vector<std::uint8_t>& selected,
-                 const OnBatch& on_batch, const Progress& progress, const std::string& stage, For purpose);
+                 const Compute& compute, const Progress& progress, const std::string& stage, For purpose);
+  void run_in_lanes(const std::vector<std::uint8_t>& selected, const Compute& compute,
+                    const Progress& progress, const std::string& stage, For purpose = For::measuring) {
+    run_works(works(selected, purpose), selected, compute, progress, stage, purpose);
+  }
   /// Samples of all blocks of a work of works(), which was called last.
   [[nodiscard]] double cost(const Work& work) const;
   [[nodiscard]] SlabShape slab_of(const Work& work) const;
@@ -123,15 +132,25 @@ class GoldStream {
                                            std::int64_t nx, std::int64_t ny) const;
   [[nodiscard]] std::vector<std::array<std::int32_t, 2>> wanted(const std::vector<float>& margins,
                                                                 std::int64_t nx, std::int64_t ny) const;
-  std::int64_t begin_batch(Batch& batch, const Work& work, const SlabShape& slab);
+  // Blocks of a work that go together.
+  struct Part {
+    const Work* work = nullptr;
+    std::size_t first = 0, blocks = 0;
+  };
+  [[nodiscard]] std::int64_t together(const Work& work) const;
+  [[nodiscard]] std::int64_t lanes_for(std::span<const Work> works) const;
+  [[nodiscard]] std::vector<Part> parts_of(const Work& work, std::int64_t lanes) const;
+  void begin_batch(Batch& batch, const Work& work) const;
+  void require_room(Batch& batch, std::int64_t blocks) const;
   [[nodiscard]] double samples(std::int64_t width_x, std::int64_t width_y, std::int64_t height) const;
   [[nodiscard]] GoldBox box(const Work& work, const std::array<std::int64_t, 2>& first) const;
   [[nodiscard]] std::vector<GoldBox> boxes(std::span<const Work> works) const;
   [[nodiscard]] double kept_share(const Work& work, const std::array<std::int64_t, 2>& first) const;
   void begin(For purpose);
-  void take_addends(Batch& batch);
-  void run_blocks(Batch& batch, const Work& work, const std::vector<std::uint8_t>& selected,
-                  const OnBatch& on_batch, const std::function<void(double)>& tick);
+  void run_parts(std::span<const Work> works, const std::vector<std::uint8_t>& selected, std::int64_t lanes,
+                 const Compute& compute, const Progress& progress, const std::string& stage);
+  void take_addends(Batch& batch) const;
+  void fill(Batch& batch, const Part& part, const std::vector<std::uint8_t>& selected, std::mutex& filling);
 
   opencl::State& state_;
   GoldSettings settings_;

@@ -246,12 +246,12 @@ class Totals {
     if (std::find(selected.begin(), selected.end(), 1) == selected.end()) return;
     const opencl::DeviceArray<std::uint8_t> on_device(f_.state, std::span<const std::uint8_t>(selected),
                                                       "bricks to measure");
-    gold.run(
+    gold.run_in_lanes(
         selected,
-        [&](GoldStream::Batch& batch) {
-          for (const BrickMeasure& m :
-               batch.measure(field_, static_cast<float>(stored_.epsilon_abs), on_device))
-            visit(m);
+        [&](GoldStream::Batch& batch) -> Take {
+          return [&visit, found = batch.measure(field_, static_cast<float>(stored_.epsilon_abs), on_device)] {
+            std::ranges::for_each(found, visit);
+          };
         },
         progress, "totals");
   }
