@@ -1,41 +1,52 @@
 // A layer between the program and the OpenCL loader, put there with LD_PRELOAD: keeps what a command reads
 // from its device, and plays it to the same command again, for which no kernel runs and nothing is copied.
 // What that takes is the host's own time. Used by bench/host_stages.
-//   VDVR_REPLAY_FILE=FILE   what is read
-//   VDVR_REPLAY=1           play it; else keep it
+//   VDVR_REPLAY_FILE=FILE   what is read; by threads beside others (in_strands) in a file each, with their
+//   name VDVR_REPLAY=1           play it; else keep it
 #include <CL/cl.h>
+#include <pthread.h>
 
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
+#include <map>
 #include <mutex>
+#include <string>
 
 #include "tests/support/next_function.hpp"
 
 namespace {
 
+// Each strand does the same in the same order, whatever the others do.
+std::string strand_name() {
+  char name[16] = "";
+  pthread_getname_np(pthread_self(), name, sizeof name);
+  return std::strncmp(name, "strand ", 7) == 0 ? std::string(".") + name : "";
+}
+
 class Tape {
  public:
   Tape() {
-    const char *name = std::getenv("VDVR_REPLAY_FILE"), *play = std::getenv("VDVR_REPLAY");
-    plays_ = play != nullptr;
-    file_ = name == nullptr ? nullptr : std::fopen(name, plays_ ? "rb" : "wb");
-    if (file_ == nullptr) fail("cannot open VDVR_REPLAY_FILE");
+    if (const char* name = std::getenv("VDVR_REPLAY_FILE")) name_ = name;
+    plays_ = std::getenv("VDVR_REPLAY") != nullptr;
   }
   Tape(const Tape&) = delete;
   Tape& operator=(const Tape&) = delete;
-  ~Tape() { std::fclose(file_); }
+  ~Tape() {
+    for (const auto& [name, file] : files_) std::fclose(file);
+  }
 
   [[nodiscard]] bool plays() const { return plays_; }
   // What a read brought, or brings.
   void pass(void* bytes, std::uint64_t size) {
-    const std::lock_guard guard(lock_);
+    std::FILE* const file = file_of(strand_name());
     std::uint64_t kept = size;
     if (plays_) {
-      if (std::fread(&kept, sizeof kept, 1, file_) != 1 || kept != size ||
-          std::fread(bytes, 1, size, file_) != size)
+      if (std::fread(&kept, sizeof kept, 1, file) != 1 || kept != size ||
+          std::fread(bytes, 1, size, file) != size)
         fail("the command reads from its device what it did not read before");
-    } else if (std::fwrite(&kept, sizeof kept, 1, file_) != 1 || std::fwrite(bytes, 1, size, file_) != size) {
+    } else if (std::fwrite(&kept, sizeof kept, 1, file) != 1 || std::fwrite(bytes, 1, size, file) != size) {
       fail("cannot write VDVR_REPLAY_FILE");
     }
   }
@@ -45,7 +56,16 @@ class Tape {
     std::fprintf(stderr, "replay_layer: %s\n", what);
     std::_Exit(70);
   }
-  std::FILE* file_ = nullptr;
+  std::FILE* file_of(const std::string& strand) {
+    const std::lock_guard guard(lock_);
+    std::FILE*& file = files_[strand];
+    if (file == nullptr) file = std::fopen((name_ + strand).c_str(), plays_ ? "rb" : "wb");
+    if (file == nullptr) fail("cannot open VDVR_REPLAY_FILE");
+    return file;
+  }
+
+  std::string name_;
+  std::map<std::string, std::FILE*> files_;
   bool plays_ = false;
   std::mutex lock_;
 };

@@ -152,7 +152,7 @@ Trial try_rates(opencl::State& state, GoldRates& gold, const Volume& base, doubl
     const double share = by_brick.empty() ? 1.0 : static_cast<double>(by_brick[at(m.brick)]);
     t.slack = std::max(t.slack, static_cast<double>(m.slack) / share);
   };
-  stream.run_in_lanes(
+  stream.run_in_strands(
       selected,
       [&](GoldStream::Batch& batch) -> Take {
         return [&, found = batch.measure(field, static_cast<float>(epsilon), device_selected)] {

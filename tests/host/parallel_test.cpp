@@ -5,8 +5,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <boost/test/unit_test.hpp>
+#include <chrono>
 #include <fstream>
+#include <numeric>
 #include <stdexcept>
 
 #include "vdvr/error.hpp"
@@ -42,7 +45,13 @@ BOOST_AUTO_TEST_CASE(without_a_thread_to_be_had_the_caller_does_it_all) {
     } catch (const std::system_error&) {
       refused = true;
     }
-    ::_exit(refused && taken() == std::vector<int>(n, 1) ? 0 : refused ? 1 : 2);
+    std::vector<int> in_order;
+    in_strands(n, 2, [&](std::size_t, std::int64_t i) -> Take {
+      return [&in_order, i] { in_order.push_back(static_cast<int>(i)); };
+    });
+    const bool all =
+        taken() == std::vector<int>(n, 1) && std::ssize(in_order) == n && std::ranges::is_sorted(in_order);
+    ::_exit(refused && all ? 0 : refused ? 1 : 2);
   }
   int status = -1;
   ::waitpid(child, &status, 0);
@@ -103,4 +112,98 @@ BOOST_AUTO_TEST_CASE(a_requested_stop_ends_loops_that_report_nothing) {
   BOOST_CHECK_THROW(parallel_for(1, {}, "", [](std::int64_t) {}), Interrupted);
   request_stop(0);
   parallel_for(1, {}, "", [](std::int64_t) {});
+}
+
+// --- strands ---
+
+namespace {
+
+// What is taken, in its order; every part computes for a while that differs.
+std::vector<std::int64_t> taken_of(std::int64_t parts, std::int64_t strands) {
+  std::vector<std::int64_t> out;
+  in_strands(parts, strands, [&](std::size_t, std::int64_t i) -> Take {
+    std::this_thread::sleep_for(std::chrono::microseconds(i * 37 % 5 * 100));
+    return [&out, i] { out.push_back(i); };
+  });
+  return out;
+}
+
+std::vector<std::int64_t> numbers(std::int64_t parts) {
+  std::vector<std::int64_t> out(static_cast<std::size_t>(parts));
+  std::iota(out.begin(), out.end(), 0);
+  return out;
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(what_strands_compute_is_taken_in_order) {
+  for (const std::int64_t strands : {1, 2, 3, 7})
+    for (const std::int64_t parts : {0, 1, 2, 60}) BOOST_TEST(taken_of(parts, strands) == numbers(parts));
+}
+
+BOOST_AUTO_TEST_CASE(a_strand_has_its_parts_and_one_at_a_time_and_is_not_far_ahead) {
+  constexpr std::int64_t strands = 3, parts = 60;
+  const auto caller = std::this_thread::get_id();
+  std::array<std::atomic<int>, 3> within{};
+  std::atomic<std::int64_t> taken_so_far{0};
+  std::atomic<bool> wrong{false};
+  in_strands(parts, strands, [&](std::size_t strand, std::int64_t i) -> Take {
+    if (++within.at(strand) != 1 || i % strands != static_cast<std::int64_t>(strand) ||
+        std::this_thread::get_id() == caller || i >= taken_so_far + 2 * strands)
+      wrong = true;
+    std::this_thread::yield();
+    --within.at(strand);
+    return [&] {
+      if (std::this_thread::get_id() != caller) wrong = true;
+      ++taken_so_far;
+    };
+  });
+  BOOST_TEST(!wrong);
+  BOOST_TEST(taken_so_far == parts);
+}
+
+BOOST_AUTO_TEST_CASE(strands_compute_beside_each_other) {
+  std::atomic<int> here{0};
+  in_strands(2, 2, [&](std::size_t, std::int64_t) -> Take {
+    ++here;
+    while (here < 2) std::this_thread::yield();  // for the other one
+    return [] {};
+  });
+  BOOST_TEST(here == 2);
+}
+
+BOOST_AUTO_TEST_CASE(exceptions_of_strands_and_of_what_takes_come_out_once_all_have_ended) {
+  std::atomic<int> running{0};
+  const auto compute = [&](std::int64_t bad) {
+    return [&running, bad](std::size_t, std::int64_t i) -> Take {
+      ++running;
+      std::this_thread::yield();
+      --running;
+      if (i == bad) throw std::domain_error("here");
+      return [i] {
+        if (i == 20) throw std::range_error("there");
+      };
+    };
+  };
+  for (const std::int64_t strands : {1, 2, 3}) {
+    BOOST_CHECK_THROW(in_strands(n, strands, compute(10)), std::domain_error);
+    BOOST_TEST(running == 0);
+    BOOST_CHECK_THROW(in_strands(n, strands, compute(-1)), std::range_error);
+    BOOST_TEST(running == 0);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(a_requested_stop_ends_strands) {
+  for (const std::int64_t strands : {1, 3}) {
+    std::atomic<std::int64_t> done{0};
+    BOOST_CHECK_THROW(in_strands(n, strands,
+                                 [&](std::size_t, std::int64_t i) -> Take {
+                                   if (i == 10) request_stop(143);
+                                   ++done;
+                                   return [] {};
+                                 }),
+                      Interrupted);
+    BOOST_TEST(done < n);
+    request_stop(0);
+  }
 }

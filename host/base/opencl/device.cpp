@@ -166,25 +166,25 @@ State::State(State* main)
 
 State::~State() {
   ahead_ = nullptr;  // its thread builds for this context
-  lanes_.clear();
+  strands_.clear();
   // Kernels may still run, and writes read what is staged.
   if (queue() != nullptr) clFinish(queue());
 }
 
-State& State::lane(std::size_t number) {
+State& State::strand(std::size_t number) {
   const std::lock_guard guard(pool_lock_);
   try {
-    while (lanes_.size() <= number) lanes_.push_back(std::make_unique<State>(this));
+    while (strands_.size() <= number) strands_.push_back(std::make_unique<State>(this));
   } catch (const cl::Error& e) {
     throw DeviceError(fmt::format("another queue on '{}': {}", info.name, code_name(e.err())));
   }
-  return *lanes_[number];
+  return *strands_[number];
 }
 
 // A card hides the host's work behind others' kernels, a CPU the ends of launches too, where its threads run
 // dry. PoCL before 6.0 counts the users of a kernel that it holds for one size down for another size that was
 // launched after it, and aborts at 0 (pocl_release_dlhandle_cache). 3.1 counts each twice up: two may run.
-int State::most_lanes() const {
+int State::most_strands() const {
   if (info.platform != pocl_platform) return info.is_cpu ? 2 : 4;
   double version = 0;
   std::from_chars(info.driver.data(), info.driver.data() + info.driver.size(), version);
@@ -205,13 +205,13 @@ void State::wait_for(State& other) {
 
 std::uint64_t State::kept_bytes() const {
   std::uint64_t bytes = pool_.bytes();
-  for (const auto& lane : lanes_) bytes += lane->pool_.bytes();
+  for (const auto& strand : strands_) bytes += strand->pool_.bytes();
   return bytes;
 }
 
 void State::clear_pools() {
   pool_.clear();
-  for (const auto& lane : lanes_) lane->pool_.clear();
+  for (const auto& strand : strands_) strand->pool_.clear();
 }
 
 cl::Buffer State::allocate(std::uint64_t bytes, const std::string& what) {

@@ -99,8 +99,8 @@ const cl::Program& State::built(const std::string& name, const Defines& defines)
   return programs_.emplace(key, std::move(program)).first->second;
 }
 
-const cl::Program& program(State& of_lane, const std::string& name, const Defines& defines) {
-  State& state = of_lane.main_;
+const cl::Program& program(State& of_strand, const std::string& name, const Defines& defines) {
+  State& state = of_strand.main_;
   const cl::Program& built = state.built(name, defines);
   const std::lock_guard guard(state.programs_lock_);
   const std::pair wanted{name, defines};

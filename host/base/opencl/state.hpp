@@ -1,6 +1,6 @@
 // What a Device holds: context, in-order queue, program cache, and the account of our allocations. Threads
 // may share it: OpenCL's own calls are safe, whatever else changes stands behind locks. A cl::Kernel is not,
-// so that each launcher has its own. Threads that should not wait for each other take a lane of it each.
+// so that each launcher has its own. Threads that should not wait for each other take a strand of it each.
 #pragma once
 
 #include <chrono>
@@ -132,7 +132,7 @@ class ProgramsAhead;
 /// Shared by the Device and by what may outlive it.
 struct State : std::enable_shared_from_this<State> {
   State() : memory(own_memory_), main_(*this) {}
-  /// lane() alone makes them.
+  /// strand() alone makes them.
   explicit State(State* main);
   ~State();  // waits for what is enqueued
   State(const State&) = delete;
@@ -149,9 +149,9 @@ struct State : std::enable_shared_from_this<State> {
 
   /// A queue beside this one, with arrays of its own in the pool, so that none is used again before its
   /// kernels are over; all else is this one's. The same for the same number, and it lives as long as this.
-  State& lane(std::size_t number);
+  State& strand(std::size_t number);
   /// How many of them are of use, and safe, beside each other; 1: none but this.
-  [[nodiscard]] int most_lanes() const;
+  [[nodiscard]] int most_strands() const;
   /// What is enqueued here from now on begins when all that is enqueued there has ended.
   void wait_for(State& other);
 
@@ -185,14 +185,14 @@ struct State : std::enable_shared_from_this<State> {
   friend const cl::Program& program(State&, const std::string&, const Defines&);
   friend class ProgramsAhead;
   const cl::Program& built(const std::string& name, const Defines& defines);
-  // Of the pools of all lanes.
+  // Of the pools of all strands.
   [[nodiscard]] std::uint64_t kept_bytes() const;
   void clear_pools();
 
   MemoryAccount own_memory_;
   State& main_;
-  std::vector<std::unique_ptr<State>> lanes_;
-  std::mutex pool_lock_;  // of the lanes and of their pools too; the account's own may be taken under it
+  std::vector<std::unique_ptr<State>> strands_;
+  std::mutex pool_lock_;  // of the strands and of their pools too; the account's own may be taken under it
   BufferPool pool_;
   std::mutex pace_lock_;
   std::deque<Launched> in_flight_;

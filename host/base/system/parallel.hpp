@@ -57,10 +57,10 @@ void parallel_for(std::int64_t n, const Progress& progress, const std::string& s
 /// What is left to do of one part of a loop once it is computed.
 using Take = std::function<void()>;
 
-/// compute(lane, i) for 0 <= i < n, in so many threads of their own at once: lane l computes l, l + lanes and
-/// so on, one after another. What each returns the calling thread calls, in the order of i; no lane is more
-/// than two parts ahead of it. Of one lane the calling thread does all.
-void in_lanes(std::int64_t n, std::int64_t lanes,
-              const std::function<Take(std::size_t lane, std::int64_t i)>& compute);
+/// compute(strand, i) for 0 <= i < n, in so many threads of their own at once: strand l computes l, l +
+/// strands and so on, one after another. What each returns the calling thread calls, in the order of i; no
+/// strand is more than two parts ahead of it. Of one strand the calling thread does all.
+void in_strands(std::int64_t n, std::int64_t strands,
+                const std::function<Take(std::size_t strand, std::int64_t i)>& compute);
 
 }  // namespace vdvr

@@ -140,7 +140,7 @@ class GoldBatch {
   [[nodiscard]] opencl::Range columns_of_bricks(std::uint64_t bricks) const;
   [[nodiscard]] opencl::DeviceArray<cl_int4> places(const std::vector<std::int64_t>& bricks) const;
 
-  opencl::State& state_;  // a lane's, but of gold_
+  opencl::State& state_;  // a strand's, but of gold_
   const GoldSettings& settings_;
   std::int64_t bricks_x_ = 0, bricks_y_ = 0, bricks_z_ = 0;  // per block
   GoldBlocks shape_;

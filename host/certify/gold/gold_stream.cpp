@@ -191,12 +191,12 @@ void GoldStream::run_works(std::span<const Work> works, const std::vector<std::u
                            const Compute& compute, const Progress& progress, const std::string& stage,
                            For purpose) {
   begin(purpose);
-  run_parts(works, selected, lanes_for(works), compute, progress, stage);
+  run_parts(works, selected, strands_for(works), compute, progress, stage);
 }
 
 // Of what `begin` was called for.
 void GoldStream::run_parts(std::span<const Work> works, const std::vector<std::uint8_t>& selected,
-                           std::int64_t lanes, const Compute& compute, const Progress& progress,
+                           std::int64_t strands, const Compute& compute, const Progress& progress,
                            const std::string& stage) {
   source_->kept.prepare(lattice_, boxes(works), progress);
   if (!settings_.base_only) source_->remainder->require(bricks_of(works, selected), progress);
@@ -204,18 +204,18 @@ void GoldStream::run_parts(std::span<const Work> works, const std::vector<std::u
   double total = 0, done = 0;
   for (const Work& w : works) {
     total += cost(w);
-    std::ranges::copy(parts_of(w, lanes), std::back_inserter(parts));
+    std::ranges::copy(parts_of(w, strands), std::back_inserter(parts));
   }
   Stopwatch watch(state_);
   GoldSpent& spent = spent_[at(static_cast<std::int64_t>(purpose_))];
-  std::vector<std::unique_ptr<Batch>> batches(at(lanes));  // their arrays serve all works
+  std::vector<std::unique_ptr<Batch>> batches(at(strands));  // their arrays serve all works
   for (std::size_t l = 0; l < batches.size(); ++l)
-    batches[l].reset(new Batch(lanes > 1 ? state_.lane(l) : state_, settings_));
+    batches[l].reset(new Batch(strands > 1 ? state_.strand(l) : state_, settings_));
   std::mutex filling;
-  in_lanes(std::ssize(parts), lanes, [&](std::size_t lane, std::int64_t i) -> Take {
+  in_strands(std::ssize(parts), strands, [&](std::size_t strand, std::int64_t i) -> Take {
     const Part& part = parts[at(i)];
-    fill(*batches[lane], part, selected, filling);
-    return [&, take = compute(*batches[lane])] {
+    fill(*batches[strand], part, selected, filling);
+    return [&, take = compute(*batches[strand])] {
       take();
       const Work& w = *part.work;
       const double a_block = samples(w.width_x, w.width_y, w.height);
@@ -311,8 +311,8 @@ void GoldStream::begin_batch(Batch& batch, const Work& work) const {
     }
 }
 
-// Blocks of a work that may go together, of all lanes: what fits them takes as much again. A CPU has them in
-// its caches; a card runs dry between small launches.
+// Blocks of a work that may go together, of all strands: what fits them takes as much again. A CPU has them
+// in its caches; a card runs dry between small launches.
 std::int64_t GoldStream::together(const Work& work) const {
   const std::int64_t side = std::int64_t{settings_.granularity} * settings_.rate,
                      nodes = (work.width_x * side + 1) * (work.width_y * side + 1) * slab_of(work).stride,
@@ -326,15 +326,15 @@ std::int64_t GoldStream::together(const Work& work) const {
   return std::max<std::int64_t>(1, bytes / per_block);
 }
 
-// Host and device take turns in each: while one lane's results are looked at, the device has another's.
-std::int64_t GoldStream::lanes_for(std::span<const Work> works) const {
-  std::int64_t lanes = state_.most_lanes();
-  for (const Work& w : works) lanes = std::min(lanes, together(w));
-  return lanes;
+// Host and device take turns in each: while one strand's results are looked at, the device has another's.
+std::int64_t GoldStream::strands_for(std::span<const Work> works) const {
+  std::int64_t strands = state_.most_strands();
+  for (const Work& w : works) strands = std::min(strands, together(w));
+  return strands;
 }
 
-std::vector<GoldStream::Part> GoldStream::parts_of(const Work& work, std::int64_t lanes) const {
-  const std::size_t most = at(together(work) / lanes);
+std::vector<GoldStream::Part> GoldStream::parts_of(const Work& work, std::int64_t strands) const {
+  const std::size_t most = at(together(work) / strands);
   std::vector<Part> out;
   for (std::size_t first = 0; first < work.first.size(); first += most)
     out.push_back({&work, first, std::min(most, work.first.size() - first)});

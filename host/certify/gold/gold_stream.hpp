@@ -79,8 +79,8 @@ class GoldStream {
   /// Some of them, `selected` and `purpose` as there: a block is the same whoever else is computed.
   void run_works(std::span<const Work> works, const std::vector<std::uint8_t>& selected,
                  const Compute& compute, const Progress& progress, const std::string& stage, For purpose);
-  void run_in_lanes(const std::vector<std::uint8_t>& selected, const Compute& compute,
-                    const Progress& progress, const std::string& stage, For purpose = For::measuring) {
+  void run_in_strands(const std::vector<std::uint8_t>& selected, const Compute& compute,
+                      const Progress& progress, const std::string& stage, For purpose = For::measuring) {
     run_works(works(selected, purpose), selected, compute, progress, stage, purpose);
   }
   /// Samples of all blocks of a work of works(), which was called last.
@@ -138,8 +138,8 @@ class GoldStream {
     std::size_t first = 0, blocks = 0;
   };
   [[nodiscard]] std::int64_t together(const Work& work) const;
-  [[nodiscard]] std::int64_t lanes_for(std::span<const Work> works) const;
-  [[nodiscard]] std::vector<Part> parts_of(const Work& work, std::int64_t lanes) const;
+  [[nodiscard]] std::int64_t strands_for(std::span<const Work> works) const;
+  [[nodiscard]] std::vector<Part> parts_of(const Work& work, std::int64_t strands) const;
   void begin_batch(Batch& batch, const Work& work) const;
   void require_room(Batch& batch, std::int64_t blocks) const;
   [[nodiscard]] double samples(std::int64_t width_x, std::int64_t width_y, std::int64_t height) const;
@@ -147,7 +147,7 @@ class GoldStream {
   [[nodiscard]] std::vector<GoldBox> boxes(std::span<const Work> works) const;
   [[nodiscard]] double kept_share(const Work& work, const std::array<std::int64_t, 2>& first) const;
   void begin(For purpose);
-  void run_parts(std::span<const Work> works, const std::vector<std::uint8_t>& selected, std::int64_t lanes,
+  void run_parts(std::span<const Work> works, const std::vector<std::uint8_t>& selected, std::int64_t strands,
                  const Compute& compute, const Progress& progress, const std::string& stage);
   void take_addends(Batch& batch) const;
   void fill(Batch& batch, const Part& part, const std::vector<std::uint8_t>& selected, std::mutex& filling);

@@ -246,7 +246,7 @@ class Totals {
     if (std::find(selected.begin(), selected.end(), 1) == selected.end()) return;
     const opencl::DeviceArray<std::uint8_t> on_device(f_.state, std::span<const std::uint8_t>(selected),
                                                       "bricks to measure");
-    gold.run_in_lanes(
+    gold.run_in_strands(
         selected,
         [&](GoldStream::Batch& batch) -> Take {
           return [&visit, found = batch.measure(field_, static_cast<float>(stored_.epsilon_abs), on_device)] {

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "host/base/opencl/kernel.hpp"
+#include "host/base/system/parallel.hpp"
 #include "host/volume/sampler/corner_weights.hpp"
 #include "vdvr/expert/probe_sampler.hpp"
 
@@ -373,11 +374,18 @@ SamplerProbe measure_filters(opencl::State& state) {
     p.note = "no CL_R / CL_FLOAT 3D image with the linear filter";
     return p;
   }
-  p.note = measure_filter(state, p, SampleType::f32);
   p.u16.image3d = state.info.linear_u16_image;
   p.u8.image3d = state.info.linear_u8_image;
-  if (p.u16.image3d) measure_filter(state, p.u16, SampleType::u16);
-  if (p.u8.image3d) measure_filter(state, p.u8, SampleType::u8);
+  const std::array<std::pair<FilterProbe*, SampleType>, 3> each{
+      {{&p, SampleType::f32}, {&p.u16, SampleType::u16}, {&p.u8, SampleType::u8}}};
+  in_strands(std::ssize(each), std::ssize(each), [&](std::size_t i, std::int64_t) -> Take {
+    const auto& [of, type] = each[i];
+    if (!of->image3d) return [] {};
+    const std::string note = measure_filter(state, *of, type);
+    return [&p, type, note] {
+      if (type == SampleType::f32) p.note = note;
+    };
+  });
   return p;
 }
 
