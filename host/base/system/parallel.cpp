@@ -4,7 +4,6 @@
 
 #include <condition_variable>
 #include <map>
-#include <system_error>
 #include <utility>
 
 namespace vdvr {
@@ -17,8 +16,9 @@ class Strands {
   Strands(std::int64_t n, std::int64_t strands, const Compute& compute)
       : n_(n), strands_(strands), compute_(compute) {
     try {
+      threads_.reserve(static_cast<std::size_t>(strands));
       for (std::int64_t l = 0; l < strands; ++l) threads_.emplace_back([this, l] { work(l); });
-    } catch (const std::system_error&) {  // no thread or memory to be had: the caller computes all of it
+    } catch (const std::exception&) {  // no thread or memory to be had: the caller computes all of it
       end();
       ready_.clear();
       strands_ = 0;
