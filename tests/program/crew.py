@@ -73,10 +73,11 @@ def devices(work, _):
             work.same(expected, "--device", given, **two)
     plan = ["plan", work.scan, "--epsilon", "15%", "--granularity", "2", "--json"]
     alone = json.loads(work.run(plan).stdout)["foreseen"]
-    spread = json.loads(work.run([*plan, "--ranks", "4", "--machines", "2"]).stdout)["foreseen"]["spread"]
+    foreseen = json.loads(work.run([*plan, "--ranks", "4", "--machines", "2"]).stdout)["foreseen"]
+    spread, one = foreseen["spread"], foreseen["memory_bytes"]  # which differs a little from plan to plan
     memory = spread["memory_bytes"]
     check("spread" not in alone and spread["ranks"] == 4 and spread["machines"] == 2, f"{spread}")
-    check(memory["first_machine"] >= alone["memory_bytes"] > memory["other_machine"] / 2 > 0, f"{spread}, {alone}")
+    check(memory["first_machine"] >= one > memory["other_machine"] / 2 > 0, f"{foreseen}")
     refused = work.run([*plan, "--machines", "2"], expected=2)
     check("give --ranks" in refused.stderr, refused.stderr)
     refused = work.run(work.build("--device", "0,,1"), expected=2)

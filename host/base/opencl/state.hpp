@@ -131,7 +131,7 @@ class ProgramsAhead;
 
 /// Shared by the Device and by what may outlive it.
 struct State : std::enable_shared_from_this<State> {
-  State() : memory(own_memory_), main_(*this) {}
+  State();
   /// strand() alone makes them.
   explicit State(State* main);
   ~State();  // waits for what is enqueued
@@ -150,7 +150,8 @@ struct State : std::enable_shared_from_this<State> {
   /// A queue beside this one, with arrays of its own in the pool, so that none is used again before its
   /// kernels are over; all else is this one's. The same for the same number, and it lives as long as this.
   State& strand(std::size_t number);
-  /// How many of them are of use, and safe, beside each other; 1: none but this.
+  /// How many of them are of use, and safe, beside each other; 1: none but this. It may change when another
+  /// device is opened.
   [[nodiscard]] int most_strands() const;
   /// What is enqueued here from now on begins when all that is enqueued there has ended.
   void wait_for(State& other);

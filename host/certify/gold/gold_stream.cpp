@@ -211,9 +211,11 @@ void GoldStream::run_parts(std::span<const Work> works, const std::vector<std::u
   std::vector<std::unique_ptr<Batch>> batches(at(strands));  // their arrays serve all works
   for (std::size_t l = 0; l < batches.size(); ++l)
     batches[l].reset(new Batch(strands > 1 ? state_.strand(l) : state_, settings_));
-  std::mutex filling;
+  std::mutex filling, one_by_one;
   in_strands(std::ssize(parts), strands, [&](std::size_t strand, std::int64_t i) -> Take {
     const Part& part = parts[at(i)];
+    std::unique_lock alone(one_by_one, std::defer_lock);
+    if (state_.most_strands() == 1) alone.lock();  // another device was opened since
     fill(*batches[strand], part, selected, filling);
     return [&, take = compute(*batches[strand])] {
       take();

@@ -378,8 +378,9 @@ SamplerProbe measure_filters(opencl::State& state) {
   p.u8.image3d = state.info.linear_u8_image;
   const std::array<std::pair<FilterProbe*, SampleType>, 3> each{
       {{&p, SampleType::f32}, {&p.u16, SampleType::u16}, {&p.u8, SampleType::u8}}};
-  in_strands(std::ssize(each), std::ssize(each), [&](std::size_t i, std::int64_t) -> Take {
-    const auto& [of, type] = each[i];
+  const std::int64_t strands = state.most_strands() > 1 ? std::ssize(each) : 1;
+  in_strands(std::ssize(each), strands, [&](std::size_t, std::int64_t i) -> Take {
+    const auto& [of, type] = each[static_cast<std::size_t>(i)];
     if (!of->image3d) return [] {};
     const std::string note = measure_filter(state, *of, type);
     return [&p, type, note] {
