@@ -191,16 +191,16 @@ State& State::strand(std::size_t number) {
 }
 
 // A card hides the host's work behind others' kernels, a CPU the ends of launches too, where its threads run
-// dry. Of PoCL's devices those without threads ("basic", "cpu-minimal") wait for other queues with locks
-// held. Before 6.0 it counts the users of a kernel that it holds for one size down for another size that was
+// dry. Of PoCL's devices those without threads ("basic") wait for other queues with locks held.
+// Before 6.0 it counts the users of a kernel that it holds for one size down for another size that was
 // launched after it, and aborts at 0 (pocl_release_dlhandle_cache). 3.1 counts each twice up: two may run, of
-// all devices.
+// all devices. Later ones have not been tried.
 int State::most_strands() const {
   if (info.platform != pocl_platform) return info.is_cpu ? 2 : 4;
-  if (info.name.starts_with("basic") || info.name.starts_with("cpu-minimal")) return 1;
+  if (!info.name.starts_with("pthread")) return 1;
   double version = 0;
   std::from_chars(info.driver.data(), info.driver.data() + info.driver.size(), version);
-  return version >= 6 || (version == 3.1 && open_states == 1) ? 2 : 1;
+  return version == 3.1 && open_states == 1 ? 2 : 1;
 }
 
 void State::wait_for(State& other) {
