@@ -1,8 +1,8 @@
 // A layer between the program and the OpenCL loader, put there with LD_PRELOAD: keeps what a command reads
 // from its device, and plays it to the same command again, for which no kernel runs and nothing is copied.
 // What that takes is the host's own time. Used by bench/host_stages.
-//   VDVR_REPLAY_FILE=FILE   what is read; by threads beside others (in_strands) in a file each, with their
-//   name VDVR_REPLAY=1           play it; else keep it
+//   VDVR_REPLAY_FILE=FILE   what is read; of each strand (in_strands) in FILE.strand N
+//   VDVR_REPLAY=1           play it; else keep it
 #include <CL/cl.h>
 #include <pthread.h>
 

@@ -112,5 +112,40 @@ BOOST_AUTO_TEST_CASE(bricks_are_measured_to_the_bit_as_by_one_queue) {
   }
 }
 
+// What is kept is made between the look at what is left and the batches: these get what is left then.
+BOOST_AUTO_TEST_CASE(passes_end_or_say_what_lacks_whatever_memory_is_left) {
+  const ProjectionSet scan = testing::noise_scan(24, 12, 24, 7);
+  Grid grid;
+  grid.cells = {24, 24, 24};
+  grid.spacing = {0.5, 0.5, 0.5};
+  grid.origin = {-6, -6, -6};
+  int ended = 0, lacked = 0;
+  for (std::uint64_t left = std::uint64_t{4} << 20; left < std::uint64_t{400} << 20; left += left / 3) {
+    Device device("", std::uint64_t{1} << 30);
+    opencl::State& state = device.state();
+    const FilteredScan filtered = filter_scan(state, scan, {});
+    Upsampler upsampler(state, filtered);
+    const FieldSups sups = field_sups(state, upsampler, filtered, 1);
+    GoldStream stream(state, filtered, sups, {grid, 2, 8, 8, Interpolation::six_taps});
+    const std::vector<std::uint8_t> wanted = stream.bricks_near_coverage();
+    const opencl::DeviceArray<std::uint8_t> taken(state, state.memory.left() - left, "what others hold");
+    std::size_t bricks = 0;
+    try {
+      stream.run_in_strands(
+          wanted,
+          [&](GoldStream::Batch& batch) -> Take {
+            return [&bricks, n = batch.bricks().size()] { bricks += n; };
+          },
+          {}, "pass");
+      BOOST_TEST(bricks == static_cast<std::size_t>(std::ranges::count(wanted, 1)));
+      ++ended;
+    } catch (const ResourceError&) {
+      ++lacked;
+    }
+  }
+  BOOST_TEST(ended > 0);
+  BOOST_TEST(lacked > 0);
+}
+
 }  // namespace
 }  // namespace vdvr

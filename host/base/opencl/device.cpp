@@ -7,8 +7,8 @@
 #include <array>
 #include <atomic>
 #include <bit>
-#include <charconv>
 #include <cctype>
+#include <charconv>
 #include <iterator>
 #include <stdexcept>
 #include <utility>
@@ -191,10 +191,10 @@ State& State::strand(std::size_t number) {
 }
 
 // A card hides the host's work behind others' kernels, a CPU the ends of launches too, where its threads run
-// dry. Of PoCL's devices those without threads ("basic") wait for other queues with locks held.
-// Before 6.0 it counts the users of a kernel that it holds for one size down for another size that was
-// launched after it, and aborts at 0 (pocl_release_dlhandle_cache). 3.1 counts each twice up: two may run, of
-// all devices. Later ones have not been tried.
+// dry. PoCL's devices without threads ("basic") wait for other queues with locks held. Its others,
+// before 6.0, count the users of a kernel for one size down for another size that was launched after it, and
+// abort at 0 (pocl_release_dlhandle_cache). 3.1 counts each twice up, so that two may run, of all devices.
+// Later ones have not been tried.
 int State::most_strands() const {
   if (info.platform != pocl_platform) return info.is_cpu ? 2 : 4;
   if (!info.name.starts_with("pthread")) return 1;

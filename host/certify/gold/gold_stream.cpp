@@ -159,7 +159,7 @@ void GoldStream::run(const std::vector<std::uint8_t>& selected, const OnBatch& o
     on_batch(batch);
     return Take([] {});
   };
-  run_parts(works(selected, purpose), selected, 1, compute, progress, stage);
+  run_parts(works(selected, purpose), selected, false, compute, progress, stage);
 }
 
 std::vector<GoldStream::Work> GoldStream::works(const std::vector<std::uint8_t>& selected, For purpose) {
@@ -191,26 +191,32 @@ void GoldStream::run_works(std::span<const Work> works, const std::vector<std::u
                            const Compute& compute, const Progress& progress, const std::string& stage,
                            For purpose) {
   begin(purpose);
-  run_parts(works, selected, strands_for(works), compute, progress, stage);
+  run_parts(works, selected, true, compute, progress, stage);
 }
 
 // Of what `begin` was called for.
 void GoldStream::run_parts(std::span<const Work> works, const std::vector<std::uint8_t>& selected,
-                           std::int64_t strands, const Compute& compute, const Progress& progress,
+                           bool in_strands_too, const Compute& compute, const Progress& progress,
                            const std::string& stage) {
   source_->kept.prepare(lattice_, boxes(works), progress);
   if (!settings_.base_only) source_->remainder->require(bricks_of(works, selected), progress);
-  std::vector<Part> parts;
+  // Of the memory that is left by now.
+  std::int64_t strands = in_strands_too ? state_.most_strands() : 1;
+  std::vector<std::int64_t> together;
   double total = 0, done = 0;
   for (const Work& w : works) {
     total += cost(w);
-    std::ranges::copy(parts_of(w, strands), std::back_inserter(parts));
+    together.push_back(blocks_together(w));
+    strands = std::min(strands, together.back());
   }
+  std::vector<Part> parts;
+  for (std::size_t w = 0; w < works.size(); ++w) add_parts(parts, works[w], at(together[w] / strands));
   Stopwatch watch(state_);
   GoldSpent& spent = spent_[at(static_cast<std::int64_t>(purpose_))];
   std::vector<std::unique_ptr<Batch>> batches(at(strands));  // their arrays serve all works
   for (std::size_t l = 0; l < batches.size(); ++l)
     batches[l].reset(new Batch(strands > 1 ? state_.strand(l) : state_, settings_));
+  // Host and device take turns in each: while one strand's results are looked at, the device has another's.
   std::mutex filling, one_by_one;
   in_strands(std::ssize(parts), strands, [&](std::size_t strand, std::int64_t i) -> Take {
     const Part& part = parts[at(i)];
@@ -315,7 +321,7 @@ void GoldStream::begin_batch(Batch& batch, const Work& work) const {
 
 // Blocks of a work that may go together, of all strands: what fits them takes as much again. A CPU has them
 // in its caches; a card runs dry between small launches.
-std::int64_t GoldStream::together(const Work& work) const {
+std::int64_t GoldStream::blocks_together(const Work& work) const {
   const std::int64_t side = std::int64_t{settings_.granularity} * settings_.rate,
                      nodes = (work.width_x * side + 1) * (work.width_y * side + 1) * slab_of(work).stride,
                      per_block =
@@ -328,19 +334,9 @@ std::int64_t GoldStream::together(const Work& work) const {
   return std::max<std::int64_t>(1, bytes / per_block);
 }
 
-// Host and device take turns in each: while one strand's results are looked at, the device has another's.
-std::int64_t GoldStream::strands_for(std::span<const Work> works) const {
-  std::int64_t strands = state_.most_strands();
-  for (const Work& w : works) strands = std::min(strands, together(w));
-  return strands;
-}
-
-std::vector<GoldStream::Part> GoldStream::parts_of(const Work& work, std::int64_t strands) const {
-  const std::size_t most = at(together(work) / strands);
-  std::vector<Part> out;
+void GoldStream::add_parts(std::vector<Part>& parts, const Work& work, std::size_t most) {
   for (std::size_t first = 0; first < work.first.size(); first += most)
-    out.push_back({&work, first, std::min(most, work.first.size() - first)});
-  return out;
+    parts.push_back({&work, first, std::min(most, work.first.size() - first)});
 }
 
 void GoldStream::require_room(Batch& batch, std::int64_t blocks) const {

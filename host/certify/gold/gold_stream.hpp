@@ -137,9 +137,8 @@ class GoldStream {
     const Work* work = nullptr;
     std::size_t first = 0, blocks = 0;
   };
-  [[nodiscard]] std::int64_t together(const Work& work) const;
-  [[nodiscard]] std::int64_t strands_for(std::span<const Work> works) const;
-  [[nodiscard]] std::vector<Part> parts_of(const Work& work, std::int64_t strands) const;
+  [[nodiscard]] std::int64_t blocks_together(const Work& work) const;
+  static void add_parts(std::vector<Part>& parts, const Work& work, std::size_t most);
   void begin_batch(Batch& batch, const Work& work) const;
   void require_room(Batch& batch, std::int64_t blocks) const;
   [[nodiscard]] double samples(std::int64_t width_x, std::int64_t width_y, std::int64_t height) const;
@@ -147,7 +146,7 @@ class GoldStream {
   [[nodiscard]] std::vector<GoldBox> boxes(std::span<const Work> works) const;
   [[nodiscard]] double kept_share(const Work& work, const std::array<std::int64_t, 2>& first) const;
   void begin(For purpose);
-  void run_parts(std::span<const Work> works, const std::vector<std::uint8_t>& selected, std::int64_t strands,
+  void run_parts(std::span<const Work> works, const std::vector<std::uint8_t>& selected, bool in_strands_too,
                  const Compute& compute, const Progress& progress, const std::string& stage);
   void take_addends(Batch& batch) const;
   void fill(Batch& batch, const Part& part, const std::vector<std::uint8_t>& selected, std::mutex& filling);
