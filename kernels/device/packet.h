@@ -143,13 +143,27 @@ RAY_INLINE V4 as_columns(Turned8 t) {
 }
 #define TURN(ROW) as_columns(turned8(ROW(0), ROW(1), ROW(2), ROW(3), ROW(4), ROW(5), ROW(6), ROW(7)))
 #else
-RAY_INLINE V4 as_columns(Turned8 a, Turned8 b) {
-  const V4 v = {(V)(a.x, b.x), (V)(a.y, b.y), (V)(a.z, b.z), (V)(a.w, b.w)};
-  return v;
+// Rows of four lanes in a vector, four lanes apart, so that halves of rows and then their numbers meet within
+// its quarters.
+RAY_INLINE V4 turned16(float16 a, float16 b, float16 c, float16 d) {
+  const ulong8 pa = as_ulong8(a), pb = as_ulong8(b), pc = as_ulong8(c), pd = as_ulong8(d);
+#define FIRST(p, q) as_float16((ulong8)(p.s0, q.s0, p.s2, q.s2, p.s4, q.s4, p.s6, q.s6))
+#define SECOND(p, q) as_float16((ulong8)(p.s1, q.s1, p.s3, q.s3, p.s5, q.s5, p.s7, q.s7))
+  const float16 ab_xy = FIRST(pa, pb), ab_zw = SECOND(pa, pb), cd_xy = FIRST(pc, pd), cd_zw = SECOND(pc, pd);
+#define EVEN(p, q) \
+  (float16)(p.s0, p.s2, q.s0, q.s2, p.s4, p.s6, q.s4, q.s6, p.s8, p.sa, q.s8, q.sa, p.sc, p.se, q.sc, q.se)
+#define ODD(p, q) \
+  (float16)(p.s1, p.s3, q.s1, q.s3, p.s5, p.s7, q.s5, q.s7, p.s9, p.sb, q.s9, q.sb, p.sd, p.sf, q.sd, q.sf)
+  const V4 t = {EVEN(ab_xy, cd_xy), ODD(ab_xy, cd_xy), EVEN(ab_zw, cd_zw), ODD(ab_zw, cd_zw)};
+#undef ODD
+#undef EVEN
+#undef SECOND
+#undef FIRST
+  return t;
 }
-#define TURN(ROW)                                                                     \
-  as_columns(turned8(ROW(0), ROW(1), ROW(2), ROW(3), ROW(4), ROW(5), ROW(6), ROW(7)), \
-             turned8(ROW(8), ROW(9), ROW(a), ROW(b), ROW(c), ROW(d), ROW(e), ROW(f)))
+#define TURN(ROW)                                                                                \
+  turned16((float16)(ROW(0), ROW(4), ROW(8), ROW(c)), (float16)(ROW(1), ROW(5), ROW(9), ROW(d)), \
+           (float16)(ROW(2), ROW(6), ROW(a), ROW(e)), (float16)(ROW(3), ROW(7), ROW(b), ROW(f)))
 #endif
 #endif
 
@@ -214,40 +228,5 @@ RAY_INLINE V2 as_pairs(Paired8 a, Paired8 b) {
 #endif
 #endif
 #endif
-
-// The pairs at the numbers i of four arrays.
-typedef struct {
-  V2 a, b, c, d;
-} FourPairs;
-RAY_INLINE FourPairs four_pairs(__global const float* a, __global const float* b, __global const float* c,
-                                __global const float* d, Offset i) {
-#define OF_A(n) TWO_FLOATS(a + TO_ULONG(n))
-#define OF_B(n) TWO_FLOATS(b + TO_ULONG(n))
-#define OF_C(n) TWO_FLOATS(c + TO_ULONG(n))
-#define OF_D(n) TWO_FLOATS(d + TO_ULONG(n))
-#if VDVR_LANES == 16
-  // Half the lanes at a time: their numbers then stay in registers.
-  const Paired8 la = PAIRS8(OF_A, i.lo), lb = PAIRS8(OF_B, i.lo), lc = PAIRS8(OF_C, i.lo),
-                ld = PAIRS8(OF_D, i.lo);
-  const Paired8 ha = PAIRS8(OF_A, i.hi), hb = PAIRS8(OF_B, i.hi), hc = PAIRS8(OF_C, i.hi),
-                hd = PAIRS8(OF_D, i.hi);
-  const FourPairs p = {as_pairs(la, ha), as_pairs(lb, hb), as_pairs(lc, hc), as_pairs(ld, hd)};
-#else
-#define A_LANE(n) OF_A(LANE(i, n))
-#define B_LANE(n) OF_B(LANE(i, n))
-#define C_LANE(n) OF_C(LANE(i, n))
-#define D_LANE(n) OF_D(LANE(i, n))
-  const FourPairs p = {PAIRS(A_LANE), PAIRS(B_LANE), PAIRS(C_LANE), PAIRS(D_LANE)};
-#undef A_LANE
-#undef B_LANE
-#undef C_LANE
-#undef D_LANE
-#endif
-#undef OF_A
-#undef OF_B
-#undef OF_C
-#undef OF_D
-  return p;
-}
 
 #endif

@@ -18,9 +18,9 @@ RAY_INLINE V3 clamp_to_grid(V3 c, VdvrGrid grid) {
 
 // As vdvr_brick_of.
 RAY_INLINE I brick_of(V c, int bricks) {
-  I b = TO_I(c) / VDVR_GRANULARITY;
-  b = b > bricks - 1 ? (I)(bricks - 1) : b;
-  return b < 0 ? (I)0 : b;
+  const I cell = TO_I(c), inside = cell < 0 ? (I)0 : cell;
+  const I b = AS_I(AS_U(inside) / (U)(VDVR_GRANULARITY));  // unsigned: a shift
+  return b > bricks - 1 ? (I)(bricks - 1) : b;
 }
 RAY_INLINE I3 brick_at(VdvrGrid grid, V3 c) {
   const I3 b = {brick_of(c.x, grid.bricks_x), brick_of(c.y, grid.bricks_y), brick_of(c.z, grid.bricks_z)};

@@ -52,14 +52,14 @@ RAY_INLINE V between(V a, V b, V t) {
 RAY_INLINE V3 gradient_at(FIELD, BRICKS, VdvrGrid grid, const OpenBrick* b, const Sampled* k, V3 c,
                           float3 cells_per_length, I needed) {
   const V3 f = k->cell.fraction;
-  __global const float* words = (__global const float*)field + grid.lit_samples;
-  const Corners w = float_corners(words, k);  // bits of floats
+  const Planes w =
+      planes_of((__global const float*)field + 2 * (ulong)grid.lit_samples, k);  // bits of floats
 #define OF(AXIS, g) TO_V(AXIS(AS_I(w.g)))
-#define BLEND(AXIS)                                                         \
-  between(between(between(OF(AXIS, p00.at), OF(AXIS, p00.next), f.x),       \
-                  between(OF(AXIS, p01.at), OF(AXIS, p01.next), f.x), f.y), \
-          between(between(OF(AXIS, p10.at), OF(AXIS, p10.next), f.x),       \
-                  between(OF(AXIS, p11.at), OF(AXIS, p11.next), f.x), f.y), \
+#define BLEND(AXIS)                                                       \
+  between(between(between(OF(AXIS, low.x), OF(AXIS, low.z), f.x),         \
+                  between(OF(AXIS, low.y), OF(AXIS, low.w), f.x), f.y),   \
+          between(between(OF(AXIS, high.x), OF(AXIS, high.z), f.x),       \
+                  between(OF(AXIS, high.y), OF(AXIS, high.w), f.x), f.y), \
           f.z)
   const V3 g = v3(BLEND(LIT_X), BLEND(LIT_Y), BLEND(LIT_Z));
 #undef BLEND

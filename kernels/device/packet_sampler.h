@@ -5,8 +5,8 @@
 //
 // In packets of several lanes offsets are 32-bit: the launcher takes them only where every offset fits.
 //
-// VDVR_LIT: the buffer holds lit samples (host/volume/sampler/lit_samples.hpp), float32, and behind them all
-// the gradients there, so that light costs no further samples.
+// VDVR_LIT: the buffer holds lit samples (host/volume/sampler/lit_samples.hpp), float32, each beside the next
+// one along y, and behind them all the gradients there, so that light costs no further samples.
 #ifndef VDVR_PACKET_SAMPLER_H
 #define VDVR_PACKET_SAMPLER_H
 #ifndef VDVR_LIT
@@ -63,7 +63,7 @@ typedef struct {
   I base_around, type;
   Offset place, stride_y, stride_z;
   V value_scale, bias;
-  int alike;  // all lanes' strides are those of lane 0
+  int apart;  // samples from a plane to the next one, where that is the same in all lanes; else 0
 #endif
 } OpenBrick;
 
@@ -105,9 +105,9 @@ RAY_INLINE OpenBrick open_brick(BRICKS, VdvrGrid grid, I3 at) {
       b.stride_y *
       TO_OFFSET((PICK(in_base, (I)(grid.cells_y), (I)(VDVR_GRANULARITY) << ly) >> VDVR_COARSE_Y) + 1);
 #if VDVR_LANES == 1
-  b.alike = 0;
+  b.apart = 0;
 #else
-  b.alike = !ANY((b.stride_y != LANE(b.stride_y, 0)) | (b.stride_z != LANE(b.stride_z, 0)));
+  b.apart = ANY(b.stride_z != LANE(b.stride_z, 0)) ? 0 : LANE(b.stride_z, 0);
 #endif
   b.base_around = (bits & 512) != 0;
   open_axis(&b, lx, low.x, grid.cells_x, VDVR_COARSE_X, &b.scale.x, &b.reach.x, &b.top.x, &b.first.x,
@@ -152,7 +152,7 @@ RAY_INLINE OpenBrick open_base(VdvrGrid grid, int type, float scale, float bias)
   b.type = (I)(type);
   b.value_scale = (V)(scale);
   b.bias = (V)(bias);
-  b.alike = VDVR_LANES > 1;
+  b.apart = VDVR_LANES > 1 ? (nx + 1) * (ny + 1) : 0;
   return b;
 }
 #endif
@@ -353,66 +353,7 @@ RAY_INLINE Cell base_cell_at(VdvrGrid grid, V3 c) {
 }
 #endif
 
-// Strides that all lanes share cost nothing in an address. 1: whether they do is known by packet only.
-#define VDVR_MAY_SHARE (VDVR_LIT && !VDVR_UNIFORM && VDVR_LANES > 1)
-
-// A sample point: the field there, and what it was interpolated from. Corners s<z><y><x>.
-typedef struct {
-  Cell cell;
-  V s000, s001, s010, s011, s100, s101, s110, s111;
-  V value;
-#if VDVR_MAY_SHARE
-  int alike;   // all lanes have the strides that follow
-  int ay, az;  // else the cell's own hold
-#endif
-} Sampled;
-
-// What stands at the corners of a cell: pairs along x, p<z><y>.
-typedef struct {
-  Pair p00, p01, p10, p11;
-} Corners;
-
-#if VDVR_SAMPLE_TYPES == 1
-// Of cells whose strides all lanes share.
-RAY_INLINE Corners corners_alike(__global const float* s, Offset lane, int y, int z) {
-  const FourPairs q = four_pairs(s, s + y, s + z, s + y + z, lane);
-  const Corners c = {
-      {q.a.first, q.a.second}, {q.b.first, q.b.second}, {q.c.first, q.c.second}, {q.d.first, q.d.second}};
-  return c;
-}
-RAY_INLINE Corners float_corners(__global const float* s, const Sampled* k) {
-#if VDVR_UNIFORM
-  return corners_alike(s, k->cell.lowest.lane, k->cell.y.all, k->cell.z.all);
-#else
-#if VDVR_MAY_SHARE
-  if (k->alike) return corners_alike(s, k->cell.lowest.lane, k->ay, k->az);
-#endif
-  const Place i = k->cell.lowest, iy = after(i, k->cell.y), iz = after(i, k->cell.z),
-              iyz = after(iy, k->cell.z);
-  const Corners c = {float_pair(s, i), float_pair(s, iy), float_pair(s, iz), float_pair(s, iyz)};
-  return c;
-#endif
-}
-#endif
-
-RAY_INLINE void load_corners(FIELD, Sampled* k) {
-#if VDVR_SAMPLE_TYPES == 1
-  const Corners q = float_corners((__global const float*)field, k);
-#else
-  const Cell* c = &k->cell;
-  const Place i = c->lowest, iy = after(i, c->y), iz = after(i, c->z), iyz = after(iy, c->z);
-  const Corners q = {load_pair(field, c, i), load_pair(field, c, iy), load_pair(field, c, iz),
-                     load_pair(field, c, iyz)};
-#endif
-  k->s000 = q.p00.at;
-  k->s001 = q.p00.next;
-  k->s010 = q.p01.at;
-  k->s011 = q.p01.next;
-  k->s100 = q.p10.at;
-  k->s101 = q.p10.next;
-  k->s110 = q.p11.at;
-  k->s111 = q.p11.next;
-}
+#include "device/packet_corners.h"
 
 // As vdvr_sample_in_brick: x first, then y, then z.
 RAY_INLINE void interpolate(Sampled* k) {
@@ -424,10 +365,8 @@ RAY_INLINE void interpolate(Sampled* k) {
 RAY_INLINE Sampled sample_open(FIELD, const OpenBrick* b, VdvrGrid grid, V3 c) {
   Sampled k;
   k.cell = cell_at(grid, b, c);
-#if VDVR_MAY_SHARE
-  k.alike = b->alike;
-  k.ay = LANE(b->stride_y, 0);
-  k.az = LANE(b->stride_z, 0);
+#if VDVR_LIT && !VDVR_UNIFORM
+  k.apart = b->apart;
 #endif
   load_corners(field, &k);
   interpolate(&k);
@@ -443,14 +382,10 @@ RAY_INLINE Sampled sample_base_first(FIELD, const OpenBrick* b, int all_base, Vd
   Sampled k;
   if (all_base) {
     k.cell = base_cell_at(grid, c);
-    k.alike = 1;
-    k.ay = k.cell.y.all;
-    k.az = k.cell.z.all;
+    k.apart = k.cell.z.all;
   } else {
     k.cell = cell_at(grid, b, c);
-    k.alike = b->alike;
-    k.ay = LANE(b->stride_y, 0);
-    k.az = LANE(b->stride_z, 0);
+    k.apart = b->apart;
   }
   load_corners(field, &k);
   interpolate(&k);

@@ -24,7 +24,7 @@ struct Lit {
   explicit Lit(const MixedVolume& v) : field(&v), resident(device(), v) {
     const LitSamples& lit = resident.impl().lit();
     auto& queue = resident.impl().state->queue;
-    words.resize(2 * resident.impl().lit_layout.samples());
+    words.resize(4 * resident.impl().lit_layout.samples());
     records.resize(2 * v.level.size());
     queue.enqueueReadBuffer(lit.samples(), CL_TRUE, 0, words.size() * 4, words.data());
     queue.enqueueReadBuffer(lit.bricks(), CL_TRUE, 0, records.size() * 4, records.data());
@@ -32,18 +32,30 @@ struct Lit {
   }
   /// Sample number x, y, z of a brick: where it stands.
   [[nodiscard]] std::size_t place(std::size_t brick, const Index3& sample) const {
-    const LevelTriple l = field->level[brick];
-    const Index3 base = field->base_samples();
-    const bool in_base = l == LevelTriple{0, 0, 0};
-    const auto side = [&](std::size_t a) { return in_base ? base[a] : field->tile_shape(l)[2 - a]; };
     return records[2 * brick] +
-           static_cast<std::size_t>(sample[0] + side(0) * (sample[1] + side(1) * sample[2]));
+           static_cast<std::size_t>(sample[0] + side(brick, 0) * (sample[1] + side(brick, 1) * sample[2]));
   }
-  [[nodiscard]] float value(std::size_t at) const { return std::bit_cast<float>(words[at]); }
+  /// Samples along an axis of what stores the brick: its tile, or the base.
+  [[nodiscard]] std::int64_t side(std::size_t brick, std::size_t axis) const {
+    const LevelTriple l = field->level[brick];
+    return l == LevelTriple{0, 0, 0} ? field->base_samples()[axis] : field->tile_shape(l)[2 - axis];
+  }
+  /// Nothing of what stores the brick is behind that along y.
+  [[nodiscard]] bool is_in_last_row(std::size_t brick, std::size_t at) const {
+    const std::size_t first = field->level[brick] == LevelTriple{0, 0, 0} ? 0 : records[2 * brick];
+    return static_cast<std::int64_t>(at - first) / side(brick, 0) % side(brick, 1) == side(brick, 1) - 1;
+  }
+  [[nodiscard]] float value(std::size_t at) const { return std::bit_cast<float>(words[2 * at]); }
+  /// Whether the words beside a value and a gradient are those of sample number `next`.
+  [[nodiscard]] bool stands_beside(std::size_t at, std::size_t next) const {
+    const std::size_t gradients = words.size() / 2;
+    return words[2 * at + 1] == words[2 * next] &&
+           words[gradients + 2 * at + 1] == words[gradients + 2 * next];
+  }
   [[nodiscard]] Vec3 gradient(std::size_t at) const {
     Vec3 g{};
     for (std::size_t a = 0; a < 3; ++a) {
-      const int bits = static_cast<int>(words[words.size() / 2 + at] >> (10 * a) & 1023u);
+      const int bits = static_cast<int>(words[words.size() / 2 + 2 * at] >> (10 * a) & 1023u);
       g[a] = unit * (bits > 511 ? bits - 1024 : bits);
     }
     return g;
@@ -154,13 +166,16 @@ std::vector<MixedVolume> waves() {
 
 void check_values(const MixedVolume& v) {
   const Lit lit(v);
-  int wrong = 0;
+  int wrong = 0, apart = 0;
   each_sample(v, [&](std::size_t b, const Index3& s, const Vec3&) {
-    if (!(static_cast<double>(lit.value(lit.place(b, s))) ==
-          reference::stored_sample(v, brick_position(v, b), s)))
+    const std::size_t at = lit.place(b, s);
+    if (!(static_cast<double>(lit.value(at)) == reference::stored_sample(v, brick_position(v, b), s)))
       ++wrong;
+    if (!lit.stands_beside(at, lit.is_in_last_row(b, at) ? at : lit.place(b, {s[0], s[1] + 1, s[2]})))
+      ++apart;
   });
   BOOST_TEST(wrong == 0);
+  BOOST_TEST(apart == 0);
 }
 
 RenderOptions seen(const MixedVolume& v) {

@@ -7,6 +7,7 @@
 
 #include "host/picture/render/check_render_options.hpp"
 #include "host/picture/render/raycast_params.hpp"
+#include "host/volume/sampler/lit_samples.hpp"
 #include "host/volume/sampler/picture_parts.hpp"
 #include "vdvr/error.hpp"
 
@@ -16,8 +17,8 @@ bool stored_would_fit(const PagedVolume& volume) {
   const PagedVolume::Impl& v = volume.impl();
   const DeviceInfo& d = v.state->info;
   return v.whole_lit <= static_cast<std::uint64_t>(std::numeric_limits<std::int32_t>::max()) &&
-         8 * v.whole_lit <= d.max_allocation &&
-         sample_buffer_bytes(*v.volume) + 8 * v.whole_lit <= d.global_memory / 2;
+         lit_sample_bytes * v.whole_lit <= d.max_allocation &&
+         sample_buffer_bytes(*v.volume) + lit_sample_bytes * v.whole_lit <= d.global_memory / 2;
 }
 
 DrawnField drawn_field(const PagedVolume& volume) {

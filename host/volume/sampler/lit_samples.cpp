@@ -84,9 +84,9 @@ LitLayout::LitLayout(const MixedVolume& v, std::span<const std::uint8_t> here) {
   }
 }
 
-std::uint64_t LitLayout::bytes() const {
-  return 2 * samples_ * sizeof(cl_uint) + records_.size() * sizeof(std::uint32_t);
-}
+std::uint64_t LitLayout::sample_bytes() const { return lit_sample_bytes * samples_; }
+
+std::uint64_t LitLayout::bytes() const { return sample_bytes() + records_.size() * sizeof(std::uint32_t); }
 
 bool LitLayout::is_addressable() const {
   constexpr std::uint64_t most = std::numeric_limits<std::int32_t>::max();
@@ -95,7 +95,7 @@ bool LitLayout::is_addressable() const {
 
 LitSamples::LitSamples(opencl::State& state, const DeviceField& field, const LitLayout& layout,
                        const Grid& world, float range)
-    : samples_(state, 2 * layout.samples(), "lit samples"),
+    : samples_(state, layout.sample_bytes() / sizeof(cl_uint), "lit samples"),
       bricks_(state, std::span<const std::uint32_t>(layout.records_), "brick records of lit samples"),
       grid_(field.grid) {
   if (!layout.is_addressable())

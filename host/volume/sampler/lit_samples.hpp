@@ -1,6 +1,6 @@
 // Lit samples: the stored field on the device as float32, and behind all samples their gradients, 4 bytes
-// each, in the layout of tiles (kernels/volume/sampler/lit_samples.cl). Made on the device from the field as
-// it is stored. Read by packet_sampler.h with VDVR_LIT.
+// each, in the layout of tiles (kernels/volume/sampler/lit_samples.cl). Each stands beside the next one along
+// y. Made on the device from the field as it is stored. Read by packet_corners.h with VDVR_LIT.
 #pragma once
 
 #include <span>
@@ -11,6 +11,9 @@
 
 namespace vdvr {
 
+/// Of a value and a gradient, each beside the next one along y.
+constexpr std::uint64_t lit_sample_bytes = 16;
+
 /// Where lit samples lie; from levels alone. Host only.
 class LitLayout {
  public:
@@ -18,7 +21,8 @@ class LitLayout {
   /// tile of their triple, which has one here.
   explicit LitLayout(const MixedVolume& volume, std::span<const std::uint8_t> here = {});
   [[nodiscard]] std::uint64_t samples() const { return samples_; }
-  [[nodiscard]] std::uint64_t bytes() const;  ///< samples and records on the device
+  [[nodiscard]] std::uint64_t sample_bytes() const;  ///< of the array with values and gradients
+  [[nodiscard]] std::uint64_t bytes() const;         ///< samples and records on the device
   /// Whether 31 bits number its samples and the words of its records, as kernels do.
   [[nodiscard]] bool is_addressable() const;
   /// No brick has a tile, and the base is as fine as the grid.

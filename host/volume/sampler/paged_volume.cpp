@@ -11,6 +11,7 @@
 
 #include "host/base/system/casts.hpp"
 #include "host/base/system/scratch_pass.hpp"
+#include "host/volume/sampler/lit_samples.hpp"
 #include "vdvr/error.hpp"
 
 namespace vdvr {
@@ -110,13 +111,13 @@ std::uint64_t PagedVolume::Impl::stored_bytes_of(std::size_t brick) const {
 
 std::uint64_t PagedVolume::Impl::bytes_of(std::size_t brick, bool lit) const {
   const std::uint64_t stored = stored_bytes_of(brick);
-  return stored + (lit ? 8 * samples_of(brick) : 0);
+  return stored + (lit ? lit_sample_bytes * samples_of(brick) : 0);
 }
 
 std::uint64_t PagedVolume::Impl::fixed_bytes(bool lit) const {
   const std::uint64_t base = volume->base.bytes();
   std::uint64_t bytes = base + kDeviceBytesPerBrick * volume->level.size();
-  if (lit) bytes += 8 * volume->base.size();
+  if (lit) bytes += lit_sample_bytes * volume->base.size();
   return bytes;
 }
 
@@ -134,7 +135,7 @@ bool PagedVolume::Impl::is_addressable(std::uint64_t samples, std::uint64_t stor
     all_bytes += stored_bytes_of(brick) + 4;
   }
   if (all_bytes > state->info.max_allocation) return false;
-  return !lit || (all_samples <= most && 8 * all_samples <= state->info.max_allocation);
+  return !lit || (all_samples <= most && lit_sample_bytes * all_samples <= state->info.max_allocation);
 }
 
 std::uint64_t PagedVolume::Impl::highest_place() const { return volume->base.bytes() + memory; }

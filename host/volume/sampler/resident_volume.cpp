@@ -412,7 +412,7 @@ const Atlas& ResidentVolume::Impl::atlas() const {
 bool ResidentVolume::Impl::lit_fits() const {
   const std::lock_guard guard(lock_);
   return lit_ || (lit_layout.is_addressable() &&
-                  2 * lit_layout.samples() * sizeof(cl_uint) <= state->info.max_allocation &&
+                  lit_layout.sample_bytes() <= state->info.max_allocation &&
                   lit_layout.bytes() <= state->memory.left());
 }
 

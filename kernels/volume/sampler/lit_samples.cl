@@ -1,12 +1,13 @@
 // Lit samples: every stored sample as float32, and behind all of them the field's gradients there, a word
-// each (shared/lit_gradient.h). Apart, because most samples that a ray takes are not lit: what it reads then
-// is half as much. The gradient of a point is that of the brick that the point belongs to, whatever tile
-// stores it: central differences over one base cell, as gradient_at has it.
+// each (shared/lit_gradient.h): apart, since most samples that a ray takes are not lit. Beside each word
+// stands the next one of its tile along y, so that one load has four corners of a cell. The gradient of a
+// point is that of the brick that the point belongs to, whatever tile stores it: central differences over one
+// base cell, as gradient_at has it.
 //
 // Between bricks of different levels the finer one has samples on the shared face that the coarser one lacks.
 // close_gradients interpolates the gradients there from those that both have, edges before faces, so that
-// light has no seam. Layouts: lit[value, gradient][base, then tiles by triple][z][y][x]. Called by:
-// LitSamples in host/volume/sampler/lit_samples.cpp.
+// light has no seam. Layouts: lit[value, gradient][base, then tiles by triple][z][y][x][this one, next along
+// y; in the last row itself]. Called by: LitSamples in host/volume/sampler/lit_samples.cpp.
 #ifndef VDVR_GRANULARITY
 #error "VDVR_GRANULARITY (cells per brick and axis) must be defined"
 #endif
@@ -23,6 +24,13 @@
 
 RAY_INLINE uint word_of(int x, int y, int z) {
   return (uint)(x & 1023) | (uint)(y & 1023) << 10 | (uint)(z & 1023) << 20;
+}
+
+// Word number i, of row y of its tile, at its own place and beside the one before it along y.
+RAY_INLINE void put_word(__global uint* words, ulong i, int y, int size_x, int size_y, uint word) {
+  words[2 * i] = word;
+  if (y > 0) words[2 * (i - (ulong)size_x) + 1] = word;
+  if (y == size_y - 1) words[2 * i + 1] = word;
 }
 
 // A gradient too long for its word keeps its direction: only that counts where a gradient is strong.
@@ -139,10 +147,11 @@ __kernel PACKET_HINT void light_samples(FIELD, BRICKS, VdvrGrid grid,
   const ulong place =
       block.first +
       (((ulong)tile * (ulong)block.size_z + (ulong)z) * (ulong)block.size_y + (ulong)y) * (ulong)block.size_x;
-#define PUT(n)                                                                   \
-  if (first + 0x##n < block.size_x) {                                            \
-    lit[place + (ulong)(first + 0x##n)] = as_uint(LANE(value, n));               \
-    lit[(ulong)block.samples + place + (ulong)(first + 0x##n)] = LANE(words, n); \
+#define PUT(n)                                                                                  \
+  if (first + 0x##n < block.size_x) {                                                           \
+    const ulong i = place + (ulong)(first + 0x##n);                                             \
+    put_word(lit, i, y, block.size_x, block.size_y, as_uint(LANE(value, n)));                   \
+    put_word(lit + 2 * (ulong)block.samples, i, y, block.size_x, block.size_y, LANE(words, n)); \
   }
   EACH(PUT)
 #undef PUT
@@ -157,11 +166,13 @@ typedef struct {
 } LitTile;
 
 RAY_INLINE float3 gradient_in(const LitTile* t, int at) {
-  const int w = (int)t->gradients[at];
+  const int w = (int)t->gradients[2 * at];
   return (float3)((float)LIT_X(w), (float)LIT_Y(w), (float)LIT_Z(w)) * 0x1p-22f;
 }
 RAY_INLINE void put_gradient(const LitTile* t, int at, float3 g) {
-  t->gradients[at] = word_of((int)rint(g.x), (int)rint(g.y), (int)rint(g.z));
+  const int rows = t->last[1] + 1;
+  put_word(t->gradients, (ulong)at, at / t->stride[1] % rows, t->stride[1], rows,
+           word_of((int)rint(g.x), (int)rint(g.y), (int)rint(g.z)));
 }
 RAY_INLINE float3 between3(float3 a, float3 b, float t) { return (1.0f - t) * a + t * b; }
 
@@ -230,11 +241,12 @@ __kernel void close_gradients(BRICKS, VdvrGrid grid, __global const uint* restri
   const int tile = (int)get_global_id(0);
   if (tile >= block.tiles) return;
   const int brick = (int)tile_bricks[tile], layer = brick / grid.bricks_x, size = block.size_x * block.size_y;
-  const LitTile t = {lit + (ulong)block.samples + block.first + (ulong)tile * (ulong)(size * block.size_z),
-                     {block.level_x, block.level_y, block.level_z},
-                     {block.size_x - 1, block.size_y - 1, block.size_z - 1},
-                     {1, block.size_x, size},
-                     {brick - layer * grid.bricks_x, layer % grid.bricks_y, layer / grid.bricks_y}};
+  const LitTile t = {
+      lit + 2 * ((ulong)block.samples + block.first + (ulong)tile * (ulong)(size * block.size_z)),
+      {block.level_x, block.level_y, block.level_z},
+      {block.size_x - 1, block.size_y - 1, block.size_z - 1},
+      {1, block.size_x, size},
+      {brick - layer * grid.bricks_x, layer % grid.bricks_y, layer / grid.bricks_y}};
   for (int axis = 0; axis < 3; ++axis) close_edges(bricks, grid, &t, axis);
   for (int axis = 0; axis < 3; ++axis) close_faces(bricks, grid, &t, axis);
 }
