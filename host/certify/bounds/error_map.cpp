@@ -7,9 +7,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "host/base/opencl/kernel.hpp"
+#include "host/certify/bounds/wave_error.hpp"
 #include "shared/error_map.h"
 #include "vdvr/error.hpp"
 
@@ -24,7 +26,6 @@ constexpr int kTableSteps = 256;
 // (1 - exp(-D))^2 / D is at most 0.40727, at D = 1.2564; twice that bounds phi_j^2 / (L_j (Lambda_j - L_j)).
 constexpr double kPhaseFactor = 0.8146;
 
-// 1 - cos(kappa / 2)
 double axis_error(double kappa) { return 2 * std::pow(std::sin(kappa / 4), 2); }
 
 bool beyond_nyquist(double kappa) { return !(std::abs(kappa) <= pi * (1 + 0x1p-40)); }
@@ -103,21 +104,29 @@ double largest_wave_error(int axes) {
   return bounds().largest[static_cast<std::size_t>(axes)];
 }
 
-double wave_error_bound(std::span<const double> kappa) {
-  std::array<double, 3> x{};  // 1 - cos(kappa_j / 2)
-  if (kappa.size() > x.size())
-    throw InputError(fmt::format("wave error: {} axes; there may be 1 to 3", kappa.size()));
-  for (std::size_t j = 0; j < kappa.size(); ++j) {
-    if (beyond_nyquist(kappa[j])) return 2;  // the wave aliases: |f| + |Pf| is all there is
-    x[j] = axis_error(kappa[j]);
-  }
-  const double e = centre_error(kappa);
+double wave_error_of_axis(double kappa) {
+  return beyond_nyquist(kappa) ? std::numeric_limits<double>::infinity() : axis_error(kappa);
+}
+
+double wave_error_bound_of(const std::array<double, 3>& of_axes) {
+  std::array<double, 3> x = of_axes;
+  double e = 0;  // as centre_error
+  for (const double one : x) e += one * (1 - e);
   std::sort(x.begin(), x.end());
+  if (std::isinf(x[2])) return 2;  // the wave aliases: |f| + |Pf| is all there is
   if (x[1] == 0 || 1 - e >= kExactProduct) return e;
   // The largest two axes alone, then the third added; or all three at once.
   const double pair = x[1] + x[2] - x[1] * x[2];
   const double two = 1 - pair >= kExactProduct ? pair : std::min(x[1] + x[2], table_bound(1 - pair, 2));
   return x[0] == 0 ? two : std::min(two + x[0], table_bound(1 - e, 3));
+}
+
+double wave_error_bound(std::span<const double> kappa) {
+  std::array<double, 3> of_axes{};
+  if (kappa.size() > of_axes.size())
+    throw InputError(fmt::format("wave error: {} axes; there may be 1 to 3", kappa.size()));
+  std::transform(kappa.begin(), kappa.end(), of_axes.begin(), wave_error_of_axis);
+  return wave_error_bound_of(of_axes);
 }
 
 ErrorMap error_map(Device& device, const std::array<FrequencyAxis, 3>& axes, int rate) {
