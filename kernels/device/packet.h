@@ -118,34 +118,26 @@ RAY_INLINE V4 turned(float4 a, float4 b, float4 c, float4 d) {
   return t;
 }
 #define TURN(ROW) turned(ROW(0), ROW(1), ROW(2), ROW(3))
-#else
-typedef struct {
-  float8 x, y, z, w;
-} Turned8;
-RAY_INLINE Turned8 turned8(float4 a, float4 b, float4 c, float4 d, float4 e, float4 f, float4 g, float4 h) {
+#elif VDVR_LANES == 8
+RAY_INLINE V4 turned(float4 a, float4 b, float4 c, float4 d, float4 e, float4 f, float4 g, float4 h) {
   const float8 ae = (float8)(a, e), bf = (float8)(b, f), cg = (float8)(c, g), dh = (float8)(d, h);
 #define LOW(p, q) (float8)(p.s0, q.s0, p.s1, q.s1, p.s4, q.s4, p.s5, q.s5)
 #define HIGH(p, q) (float8)(p.s2, q.s2, p.s3, q.s3, p.s6, q.s6, p.s7, q.s7)
 #define EVEN(p, q) (float8)(p.s01, q.s01, p.s45, q.s45)
 #define ODD(p, q) (float8)(p.s23, q.s23, p.s67, q.s67)
   const float8 ab_xy = LOW(ae, bf), ab_zw = HIGH(ae, bf), cd_xy = LOW(cg, dh), cd_zw = HIGH(cg, dh);
-  const Turned8 t = {EVEN(ab_xy, cd_xy), ODD(ab_xy, cd_xy), EVEN(ab_zw, cd_zw), ODD(ab_zw, cd_zw)};
+  const V4 t = {EVEN(ab_xy, cd_xy), ODD(ab_xy, cd_xy), EVEN(ab_zw, cd_zw), ODD(ab_zw, cd_zw)};
 #undef LOW
 #undef HIGH
 #undef EVEN
 #undef ODD
   return t;
 }
-#if VDVR_LANES == 8
-RAY_INLINE V4 as_columns(Turned8 t) {
-  const V4 v = {t.x, t.y, t.z, t.w};
-  return v;
-}
-#define TURN(ROW) as_columns(turned8(ROW(0), ROW(1), ROW(2), ROW(3), ROW(4), ROW(5), ROW(6), ROW(7)))
+#define TURN(ROW) turned(ROW(0), ROW(1), ROW(2), ROW(3), ROW(4), ROW(5), ROW(6), ROW(7))
 #else
 // Rows of four lanes in a vector, four lanes apart, so that halves of rows and then their numbers meet within
 // its quarters.
-RAY_INLINE V4 turned16(float16 a, float16 b, float16 c, float16 d) {
+RAY_INLINE V4 turned(float16 a, float16 b, float16 c, float16 d) {
   const ulong8 pa = as_ulong8(a), pb = as_ulong8(b), pc = as_ulong8(c), pd = as_ulong8(d);
 #define FIRST(p, q) as_float16((ulong8)(p.s0, q.s0, p.s2, q.s2, p.s4, q.s4, p.s6, q.s6))
 #define SECOND(p, q) as_float16((ulong8)(p.s1, q.s1, p.s3, q.s3, p.s5, q.s5, p.s7, q.s7))
@@ -161,10 +153,9 @@ RAY_INLINE V4 turned16(float16 a, float16 b, float16 c, float16 d) {
 #undef FIRST
   return t;
 }
-#define TURN(ROW)                                                                                \
-  turned16((float16)(ROW(0), ROW(4), ROW(8), ROW(c)), (float16)(ROW(1), ROW(5), ROW(9), ROW(d)), \
-           (float16)(ROW(2), ROW(6), ROW(a), ROW(e)), (float16)(ROW(3), ROW(7), ROW(b), ROW(f)))
-#endif
+#define TURN(ROW)                                                                              \
+  turned((float16)(ROW(0), ROW(4), ROW(8), ROW(c)), (float16)(ROW(1), ROW(5), ROW(9), ROW(d)), \
+         (float16)(ROW(2), ROW(6), ROW(a), ROW(e)), (float16)(ROW(3), ROW(7), ROW(b), ROW(f)))
 #endif
 
 // Two numbers of every lane, from one address a lane: PAIRS(ROW), ROW(n) the TWO_FLOATS of lane n. They
@@ -192,9 +183,6 @@ RAY_INLINE V2 paired(ulong a, ulong b, ulong c, ulong d) {
 typedef struct {
   float8 first, second;
 } Paired8;
-#define PAIRS8(ROW, i)                                                                               \
-  paired8(ROW((i).s0), ROW((i).s1), ROW((i).s2), ROW((i).s3), ROW((i).s4), ROW((i).s5), ROW((i).s6), \
-          ROW((i).s7))
 RAY_INLINE Paired8 paired8(ulong a, ulong b, ulong c, ulong d, ulong e, ulong f, ulong g, ulong h) {
 #ifdef VDVR_PLAIN_VECTORS  // element by element, for simulators that cannot follow vectors that are joined
 #define FLOAT_OF(w, n) as_float((uint)((w) >> (32 * (n))))

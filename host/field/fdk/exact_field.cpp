@@ -20,7 +20,6 @@
 #include "host/field/fdk/filter_cone.hpp"
 #include "host/field/fdk/ordered_product.hpp"
 #include "host/scan/geometry/view_weights.hpp"
-#include "vdvr/expert/reconstruct.hpp"
 
 namespace vdvr {
 namespace {
@@ -127,6 +126,8 @@ ExactField::ExactField(const ProjectionSet& scan, const FieldOptions& field, con
     views_ = views.matrices;
     geometry_.center += static_cast<double>(views.pad_before);
     geometry_.columns = views.columns;
+  } else {
+    coverage_ = std::make_shared<Coverage>(geometry_);
   }
   const std::int64_t U = geometry_.columns, V = geometry_.rows, K = geometry_.views();
   const auto g = ramp_kernel(field, scan.cone ? 1.0 : geometry_.pitch_u, U);
@@ -251,7 +252,8 @@ std::vector<double> ExactField::at(std::span<const Vec3> points, const Progress&
 }
 
 bool ExactField::covered(const Vec3& point) const {
-  return cone_coverage_ ? cone_coverage_->margin(point) >= 0 : is_covered(geometry_, geometry_.center, point);
+  if (cone_coverage_) return cone_coverage_->margin(point) >= 0;
+  return coverage_->margin(point[0], point[1]) >= 0 && coverage_->margin_z(point[2]) >= 0;
 }
 
 }  // namespace vdvr

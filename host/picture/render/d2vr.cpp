@@ -10,14 +10,12 @@
 
 #include "host/base/opencl/kernel.hpp"
 #include "host/base/system/casts.hpp"
-#include "host/field/fbp/coverage.hpp"
 #include "host/field/fbp/filter_projections.hpp"
 #include "host/picture/render/check_render_options.hpp"
 #include "host/picture/render/raycast_params.hpp"
 #include "host/volume/bricks.hpp"
 #include "host/volume/sampler/resident_volume.hpp"
 #include "vdvr/error.hpp"
-#include "vdvr/expert/reconstruct.hpp"
 
 namespace vdvr {
 
@@ -141,6 +139,7 @@ D2vrField::D2vrField(Device& device, const ProjectionSet& scan, const D2vrOption
   impl_->rate = options.upsampling;
   const FilteredScan filtered = filter_projections(*impl_->state, scan, options.field, progress);
   impl_->geometry = filtered.geometry;
+  impl_->coverage.emplace(filtered.geometry);
   if (options.upsampling == 1) store_as_filtered(*impl_, filtered);
   else store_upsampled(*impl_, filtered, progress);
 }
@@ -151,7 +150,7 @@ D2vrField& D2vrField::operator=(D2vrField&&) noexcept = default;
 const ParallelGeometry& D2vrField::geometry() const { return impl_->geometry; }
 std::uint64_t D2vrField::bytes() const { return impl_->samples.size() * sizeof(float); }
 bool D2vrField::covered(const Vec3& point) const {
-  return is_covered(impl_->geometry, impl_->geometry.center, point);
+  return impl_->coverage->margin(point[0], point[1]) >= 0 && impl_->coverage->margin_z(point[2]) >= 0;
 }
 
 namespace {

@@ -1,9 +1,11 @@
 // Frames of a D2vrScene, and what the classes hold on the device.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "host/base/opencl/array.hpp"
+#include "host/field/fbp/coverage.hpp"
 #include "host/picture/render/raycast.hpp"
 #include "shared/d2vr_params.h"
 #include "vdvr/expert/d2vr.hpp"
@@ -28,6 +30,7 @@ struct D2vrField::Impl {
 
   opencl::State* state = nullptr;
   ParallelGeometry geometry;  ///< with the centre in use
+  std::optional<Coverage> coverage;
   int rate = 1;
   double first_column = 0, first_row = 0;  ///< where stored column and row 0 lie, detector pixels
   std::int64_t columns = 0, rows = 0;      ///< stored

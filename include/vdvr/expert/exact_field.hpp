@@ -15,6 +15,7 @@
 namespace vdvr {
 
 class ConeCoverage;
+class Coverage;
 
 class VDVR_API ExactField {
  public:
@@ -47,7 +48,8 @@ class VDVR_API ExactField {
 
   ParallelGeometry geometry_;
   std::vector<ViewMatrix> views_;
-  std::shared_ptr<const ConeCoverage> cone_coverage_;
+  std::shared_ptr<const Coverage> coverage_;           ///< of parallel beam
+  std::shared_ptr<const ConeCoverage> cone_coverage_;  ///< of cone beam
   std::shared_ptr<const double[]>
       coefficients_;  ///< [view][column coefficient m][row coefficient l], weights included; copies share it
   double rounding_ = 0;
