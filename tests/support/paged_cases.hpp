@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "host/volume/sampler/lit_samples.hpp"
 #include "tests/support/mixed_volumes.hpp"
 #include "vdvr/raycast.hpp"
 
@@ -18,7 +19,9 @@ inline constexpr std::uint64_t kAside = 2'500'000;
 
 /// Base and index, and of the tiles less than half: more than a few pixels need of so small a volume.
 inline std::uint64_t budget_for(const MixedVolume& v, bool lit) {
-  const auto lit_bytes = [&](const SampleBlock& b) { return b.bytes() + (lit ? 8 * b.size() : 0); };
+  const auto lit_bytes = [&](const SampleBlock& b) {
+    return b.bytes() + (lit ? lit_sample_bytes * b.size() : 0);
+  };
   std::uint64_t tiles = 0;
   for (const auto& [triple, block] : v.tiles) tiles += lit_bytes(block);
   return 97 * v.level.size() + v.base.bytes() + lit_bytes(v.base) + tiles / 2;

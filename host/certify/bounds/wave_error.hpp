@@ -6,6 +6,11 @@
 
 namespace vdvr {
 
+/// Bounds for 2 and for 3 axes where prod cos(kappa_j / 2) is i / steps * kExactProduct.
+constexpr int wave_error_steps = 256;
+using WaveErrorTable = std::array<std::array<double, wave_error_steps + 1>, 2>;
+const WaveErrorTable& wave_error_table();
+
 /// 1 - cos(kappa / 2); infinite beyond Nyquist.
 double wave_error_of_axis(double kappa);
 
