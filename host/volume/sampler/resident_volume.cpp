@@ -411,8 +411,7 @@ const Atlas& ResidentVolume::Impl::atlas() const {
 
 bool ResidentVolume::Impl::lit_fits() const {
   const std::lock_guard guard(lock_);
-  return lit_ || (lit_layout.is_addressable() &&
-                  lit_layout.sample_bytes() <= state->info.max_allocation &&
+  return lit_ || (lit_layout.is_addressable() && lit_layout.sample_bytes() <= state->info.max_allocation &&
                   lit_layout.bytes() <= state->memory.left());
 }
 
