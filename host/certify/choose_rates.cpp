@@ -93,14 +93,26 @@ ToleranceError out_of_reach(const Chosen& finest, double needed, const TrialTole
       world(t.arithmetic), world(1.1 * needed), 100 * 1.1 * needed / tolerance.reference_range));
 }
 
+// Gold is kept, and what is between its nodes and the detector is not to be chosen.
+std::vector<Rates> cone_candidates(const RateOptions& wanted) {
+  constexpr Rates made{6, Interpolation::eight_taps, 8};
+  if (wanted.upsampling.value_or(made.upsampling) != made.upsampling ||
+      wanted.interpolation.value_or(made.interpolation) != made.interpolation)
+    throw InputError(
+        "cone beam: gold is interpolated by eight taps both ways on projections at 6x, and `upsampling` and "
+        "`u_filter` cannot change that; leave them out");
+  std::vector<Rates> out;
+  for (const int gold : wanted.gold ? std::vector<int>{*wanted.gold} : std::vector<int>{8, 16, 32})
+    out.push_back({made.upsampling, made.interpolation, gold});
+  return out;
+}
+
 }  // namespace
 
 std::vector<Rates> candidates(const RateOptions& wanted, bool cone) {
-  if (cone && ((wanted.upsampling && *wanted.upsampling != 8) ||
-               (wanted.interpolation && *wanted.interpolation != Interpolation::six_taps)))
-    throw InputError(
-        "cone beam: gold is interpolated by six taps both ways on projections at 8x; `upsampling` can only "
-        "be 8, and `u_filter` six-taps");
+  if (cone) return cone_candidates(wanted);
+  if (wanted.interpolation == Interpolation::eight_taps)
+    throw InputError("`u_filter` eight-taps is of cone beam: parallel beam has linear, cubic and six-taps");
   const auto interpolation =
       wanted.upsampling.value_or(8) >= 8 ? Interpolation::six_taps : Interpolation::cubic;
   std::vector<Rates> all;

@@ -70,7 +70,7 @@ Certificate fill_certificate(const Inputs& in, Device& device, const ProjectionS
   c.budget.grid = {c.measured_max, "measured at every tested gold node on the stored field"};
   c.budget.gold = {measured.slack.gold, "curvature: signed second differences of gold, with remainder"};
   c.budget.projection = {measured.slack.projection,
-                         scan.cone ? "sups of |q|: six taps in u and v, 20 to 28 taps from kept gold"
+                         scan.cone ? "sups of |q|: eight taps in u and v, 20 to 28 taps from kept gold"
                          : plan.rates.interpolation == Interpolation::six_taps
                              ? "sups of |q|: six taps in u, 16 taps from kept gold"
                              : "sups of |q_uu| and of |q|: interpolation in u, 16 taps from kept gold"};

@@ -44,9 +44,8 @@ IntegerLattice lattice_of(std::span<const float> base, double epsilon_abs, const
 std::shared_ptr<PreparedScan> preparation_of(opencl::State& state, const ScanInUnits& from, const Plan& plan,
                                              const Progress& progress) {
   if (plan.prepared && plan.prepared->of == PreparedOf(state, from, plan.field)) return plan.prepared;
-  // Six taps need values alone.
-  const auto sups = plan.rates.interpolation == Interpolation::six_taps ? PreparedScan::Sups::of_values
-                                                                        : PreparedScan::Sups::of_derivatives;
+  const auto sups = needs_values_alone(plan.rates.interpolation) ? PreparedScan::Sups::of_values
+                                                                 : PreparedScan::Sups::of_derivatives;
   return std::make_shared<PreparedScan>(state, from, plan.field, sups, progress);
 }
 

@@ -1,7 +1,9 @@
-// What both forms of the kept nodes of cone beam share: a view as the host gives it, and six taps of a place.
+// What both forms of the kept nodes of cone beam share: a view as the host gives it, and eight taps of a
+// place.
 #ifndef VDVR_CONE_TAPS_H
 #define VDVR_CONE_TAPS_H
 #include "device/lanes.h"
+#include "shared/eight_taps.h"
 #include "shared/six_taps.h"
 
 // As host/certify/kept/cone_tiles.cpp fills it.
@@ -12,17 +14,19 @@ typedef struct {
   REAL whole_u, whole_v, unused[2];
 } ConeView;
 
-// Of taps -2 .. 3, and two that read what is not used.
-#define LANES(a, b, c, d, e, f) (float8)(a, b, c, d, e, f, 0.0f, 0.0f)
+// Rounds what lies below 2^22 to the nearest whole number where it is added.
+#define TO_WHOLE 12582912.0f
+
+// Of taps -3 .. 4.
 #define FIRST_OF(a, b, c) a
 #define SECOND_OF(a, b, c) b
 #define THIRD_OF(a, b, c) c
 // A list becomes arguments where it is handed on: OpenCL C has no macros of any number of them.
 #define TAKE(pick, list) pick(list)
-#define TAP(pick, kind, tap) TAKE(pick, VDVR_SIX_##kind##_##tap)
-#define COEFFICIENTS(pick, kind, sign)                                                        \
-  LANES(TAP(pick, kind, A), TAP(pick, kind, B), TAP(pick, kind, C), sign(TAP(pick, kind, C)), \
-        sign(TAP(pick, kind, B)), sign(TAP(pick, kind, A)))
+#define TAP(pick, kind, tap) TAKE(pick, VDVR_EIGHT_##kind##_##tap)
+#define LANES(a, b, c, d, sign) (float8)(a, b, c, d, sign(d), sign(c), sign(b), sign(a))
+#define COEFFICIENTS(pick, kind, sign) \
+  LANES(TAP(pick, kind, A), TAP(pick, kind, B), TAP(pick, kind, C), TAP(pick, kind, D), sign)
 #define SAME(x) (x)
 #define OPPOSITE(x) (-(x))
 #define EVEN_OF(pick) COEFFICIENTS(pick, EVEN, SAME)

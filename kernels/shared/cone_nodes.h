@@ -9,8 +9,8 @@
 // Views that are added up together, then to the others.
 #define VDVR_CONE_VIEWS 4
 // Of cone_runs.cl: heights of a work-item, rows of a tile alike, and floats of a strip.
-#define VDVR_CONE_RUN 32
-#define VDVR_CONE_ROWS 16
+#define VDVR_CONE_RUN 64
+#define VDVR_CONE_ROWS 8
 #define VDVR_CONE_STRIP 768
 
 #ifdef __OPENCL_VERSION__

@@ -1,6 +1,6 @@
 // Weights of six columns, by the place f between the two in the middle: polynomials of degree 5 that are
 // nearly minimax where columns are spaced at an eighth of the pixels. What they err:
-// host/certify/bounds/six_taps.hpp. Constants and products only: both compilers read them, for scalars,
+// host/certify/bounds/column_taps.hpp. Constants and products only: both compilers read them, for scalars,
 // vectors and double precision.
 //
 //   column of tap n is floor(u) + n, n = -2 .. 3;  f = u - floor(u), g = f - 1/2, s = g * g

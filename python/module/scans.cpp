@@ -141,7 +141,8 @@ void add_geometry(nb::module_& m) {
   nb::enum_<Interpolation>(m, "Interpolation")
       .value("linear", Interpolation::linear)
       .value("cubic", Interpolation::cubic)
-      .value("six-taps", Interpolation::six_taps);
+      .value("six-taps", Interpolation::six_taps)
+      .value("eight-taps", Interpolation::eight_taps);
   nb::class_<FieldOptions>(m, "FieldOptions")
       .def(nb::init<>())
       .def_rw("filter", &FieldOptions::filter)

@@ -6,7 +6,7 @@
 #include <random>
 
 #include "host/certify/bounds/amplitude_bounds.hpp"
-#include "host/certify/bounds/six_taps.hpp"
+#include "host/certify/bounds/column_taps.hpp"
 #include "host/field/fbp/reconstruct.hpp"
 #include "host/volume/sampler/sampler_terms.hpp"
 #include "tests/support/attack_chain.hpp"

@@ -5,7 +5,7 @@
 
 #include "host/base/opencl/kernel.hpp"
 #include "host/certify/bounds/projection_bounds.hpp"
-#include "host/certify/bounds/six_taps.hpp"
+#include "host/certify/bounds/column_taps.hpp"
 #include "tests/reference/back_project.hpp"
 #include "tests/reference/cosine_series.hpp"
 #include "tests/reference/ramp_filter.hpp"
@@ -215,7 +215,7 @@ BOOST_AUTO_TEST_CASE(tuning_never_changes_the_result) {
   // Twice what positions may do, of slopes in columns and of sums that are largest with six weights.
   // Positions are the same to the bit in all tilings, so that none finds itself on the other side of a
   // column.
-  const SixTaps& six = six_tap_facts();
+  const ColumnTaps& six = six_tap_facts();
   const double moved = 2 * position_error(filtered.geometry, slab.columns, blocks) * magnitude;
   for (const Interpolation filter : all_filters) {
     const auto run = [&](const ColumnTuning& tuning) {

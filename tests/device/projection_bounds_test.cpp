@@ -8,7 +8,7 @@
 
 #include "host/certify/bounds/amplitude_bounds.hpp"
 #include "host/certify/bounds/paper_bounds.hpp"
-#include "host/certify/bounds/six_taps.hpp"
+#include "host/certify/bounds/column_taps.hpp"
 #include "host/certify/gold/gold_batch.hpp"
 #include "host/certify/gold/gold_stream.hpp"
 #include "host/field/fbp/reconstruct.hpp"

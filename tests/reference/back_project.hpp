@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "host/certify/bounds/six_taps.hpp"
+#include "host/certify/bounds/column_taps.hpp"
 #include "host/field/fbp/cosine_series.hpp"
 #include "vdvr/expert/projections.hpp"
 

@@ -343,7 +343,7 @@ FAULTS = [
     ("host/field/fbp/rates.cpp", "\n", "has a home in HOMES and a source"),
     ("host/verify/verify.cpp", '#include "vdvr/expert/plan.hpp"\n', "verify.cpp: includes vdvr/expert/plan.hpp, which makes"),
     ("host/verify/verify.cpp", '#include "host/certify/forecaster.hpp"\n', "includes host/certify/forecaster.hpp, which makes"),
-    ("host/verify/witness/field_bounds.hpp", '#include "host/certify/bounds/six_taps.hpp"\n', "field_bounds.hpp: includes host/certify/bounds/six_taps.hpp, which makes"),
+    ("host/verify/witness/field_bounds.hpp", '#include "host/certify/bounds/column_taps.hpp"\n', "field_bounds.hpp: includes host/certify/bounds/column_taps.hpp, which makes"),
     ("host/verify/claims/verify_terms.hpp", '#include "host/certify/crew/gold_rates.hpp"\n', "verify.cpp: includes host/certify/crew/gold_rates.hpp, which makes what verify checks, by way of host/verify/claims/verify_terms.hpp"),
     ("host/field/fbp/orphan.hpp", "#pragma once\nnamespace vdvr {\nint orphan(int x);\n}\n", "has no source of its stem"),
     ("include/vdvr/expert/grid.hpp", '#include "host/base/system/parallel.hpp"\n', "a public header includes"),

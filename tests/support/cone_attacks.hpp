@@ -417,16 +417,16 @@ inline ConeCase draw_cone_case(std::uint64_t seed) {
             " x " + std::to_string(orbit.rows);
   c.scan = empty_scan_of(orbit, draw);
   c.target = draw_target(certified_coverage(c.scan, {}), draw, c.place);
-  // A pixel's centre; the middle between two of eight columns a pixel; as it is.
+  // A pixel's centre; the middle between two of six columns a pixel; as it is.
   if (const std::size_t shift = draw.below(3); shift < 2) {
-    const double part = shift == 0 ? 0.0 : 1.0 / 16;
+    const double part = shift == 0 ? 0.0 : 1.0 / 12;
     shift_views(c.scan, c.target, part, part);
     c.place += shift == 0 ? ", at pixels' centres" : ", between dense columns";
   }
   c.field = take_field(c.scan, certified_coverage(c.scan, {}), c.target, draw);
   constexpr std::array<int, 3> gold{4, 8, 16};
   constexpr std::array<double, 3> cells{0.6, 1, 2};
-  c.rates = {8, Interpolation::six_taps, draw.of(gold)};
+  c.rates = {6, Interpolation::eight_taps, draw.of(gold)};
   c.cells = draw.of(cells);
   c.grid = draw_grid(c.scan.geometry, c.target, c.rates, c.cells, draw);
   return c;

@@ -7,9 +7,10 @@
 #include <cmath>
 #include <cstdint>
 #include <span>
+#include <stdexcept>
 #include <vector>
 
-#include "host/certify/bounds/six_taps.hpp"
+#include "host/certify/bounds/column_taps.hpp"
 #include "host/field/fbp/filter_projections.hpp"
 #include "tests/support/attack_scans.hpp"
 #include "vdvr/expert/rates.hpp"
@@ -69,10 +70,13 @@ struct ExactColumns {
                  (1 + f) * f * (1 - f) / 6 * (*this)(k, n + 2);
           break;
         case Interpolation::six_taps: {
-          const std::array<double, 6> w = six_taps(f);
+          const std::vector<double> w = six_taps(f);
           for (std::size_t i = 0; i < w.size(); ++i)
             sum += w[i] * (*this)(k, n - 2 + static_cast<std::int64_t>(i));
+          break;
         }
+        case Interpolation::eight_taps:
+          throw std::logic_error("columns of parallel beam have no eight taps");
       }
     }
     return sum;

@@ -15,7 +15,7 @@
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
 #include "host/certify/bounds/node_functional.hpp"
-#include "host/certify/bounds/six_taps.hpp"
+#include "host/certify/bounds/column_taps.hpp"
 #include "host/field/fbp/back_project.hpp"
 #include "host/field/fdk/region_parts.hpp"
 #include "vdvr/error.hpp"
@@ -27,8 +27,8 @@ static_assert(sizeof(VdvrConeNodes) == 64);
 namespace {
 
 using std::numbers::pi;
-// Values of a table to a pixel, both ways: what six taps are made for.
-constexpr int density = 8;
+// Values of a table to a pixel, both ways: what eight taps are made for.
+constexpr int density = 6;
 // Rows from which on tables are made by transforms along v.
 constexpr std::int64_t fewest_rows = 16;
 constexpr std::uint64_t most_table_bytes = std::uint64_t{512} << 20,
@@ -319,7 +319,7 @@ void ConeTiles::back_project(std::span<const ConePage> pages, const Progress& pr
     shape.tile = count(side * side * lattice_.stride);
     shape.views = to_int(views_of_chunk.views);
     shape.column_stride = to_int(column_stride_);
-    shape.last_column = to_int(columns_.count - 6);
+    shape.last_column = to_int(columns_.count - 8);
     shape.last_row = to_int(column_stride_ - heights);
     shape.stride = to_int(lattice_.stride);
     shape.groups = to_int(lattice_.groups);
@@ -346,11 +346,11 @@ double ConeTiles::roundings_of_sum(std::int64_t views, std::int64_t together) {
 
 ConeTiles::Errors ConeTiles::errors(std::int64_t together, Fp64 fp64) {
   const ParallelGeometry& g = scan_.geometry;
-  const SixTaps& six = six_tap_facts();
-  const double square = six.norm * six.norm, views = static_cast<double>(g.views());
+  const ColumnTaps& taps = eight_tap_facts();
+  const double square = taps.norm * taps.norm, views = static_cast<double>(g.views());
   Errors out;
   // I_u I_v - 1 = (I_u - 1) + I_u (I_v - 1).
-  out.interpolation = six.sup * (1 + six.norm) * sup_;
+  out.interpolation = taps.sup * (1 + taps.norm) * sup_;
   const bool here = fp64 == Fp64::as_here, in_double = here ? in_double_ : fp64 == Fp64::present,
              dense = here ? dense_.has_value() : in_double && g.rows >= fewest_rows;
   double entries = 0;
@@ -360,17 +360,18 @@ ConeTiles::Errors ConeTiles::errors(std::int64_t together, Fp64 fp64) {
     entries = unit_roundoff * (product_error(g.rows, row_run) + 2) * gain * largest +
               column_error(upsampler_, g.columns, columns_, largest, gain * largest, fp64);
   }
-  // Places: numerator, lambda, quotient and sum; relative to what they move the values by, pi / 8 a column.
+  // Places: numerator, lambda, quotient and sum; relative to what they move the values by, pi / 6 a column.
   // Blocks are this device's: in double precision they do not matter, and those of single are smaller.
   const double unit = in_double ? 0x1p-53 : unit_roundoff;
   // Of a run of heights, places of eight are floats about their middle: a step three and a half times, what
   // they add up to, and the fractions of the middle and of each.
   const double apart = in_double ? unit_roundoff * (7 * row_step_ + 3) : 0.0;
   const double position = (2 * unit * (16 * block_reach_ + 4) + apart) * pi / density * sup_;
-  // Six products along u and one along v, their sum over the views of a chunk, eight lanes, and chunks;
-  // lambda^-2, which a float place makes err more. Runs of heights add up four views at a time: no more sums.
-  const double roundings = 6 + 1 + 3 + roundings_of_sum(g.views(), together) + (in_double ? 3 : 24);
-  out.rounding = square * entries + position + 2 * six.norm * six.rounding * sup_ +
+  // Eight products along u and one along v, their sum over the views of a chunk, eight lanes, and chunks;
+  // lambda^-2, which a float place makes err more. Runs of heights add up eight views at a time: no more
+  // sums.
+  const double roundings = 8 + 1 + 3 + roundings_of_sum(g.views(), together) + (in_double ? 3 : 24);
+  out.rounding = square * entries + position + 2 * taps.norm * taps.rounding * sup_ +
                  1.01 * unit_roundoff * roundings * square * sup_ +
                  views * largest_weight_ * (2 * product_underflow(g, upsampler_.gain_u()) + 16 * 0x1p-126);
   return out;

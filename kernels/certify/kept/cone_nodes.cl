@@ -1,5 +1,5 @@
-// Kept nodes of cone beam: out[tile][y][x][height] += sum_k lambda^-2 q_k(u, v), by six taps both ways from
-// tables of eight values a pixel (docs/error-bounds.md, section 16). Layouts: float table[view][column][row];
+// Kept nodes of cone beam: out[tile][y][x][height] += sum_k lambda^-2 q_k(u, v), by eight taps both ways from
+// tables of six values a pixel (docs/error-bounds.md, section 16). Layouts: float table[view][column][row];
 // ConeView views[tile][block][view]; int4 wanted[tile][y]: first and last column of nodes, the first height
 // and the one after the last. Places are in columns and rows of the table, relative to the middle of a block
 // of nodes. Neighbours in y, which read the same columns and rows, follow one another. Of upright detectors,
@@ -10,17 +10,19 @@
 #include "shared/cone_nodes.h"
 
 #define COLUMN(j) vload8(0, from + (size_t)(j)*column_stride)
-// What a view adds at one height: six columns of eight rows, by weights along u, then along v.
+// What a view adds at one height: eight columns of eight rows, by weights along u, then along v.
 #define ADD(n, at_u, weight, at_v, share_v)                                                         \
   {                                                                                                 \
     __global const float* from =                                                                    \
         plane + (size_t)clamp(at_u, 0, s.last_column) * column_stride + clamp(at_v, 0, s.last_row); \
-    float8 across = (float8)(weight.s1) * COLUMN(1);                                                \
-    across = fma((float8)(weight.s0), COLUMN(0), across);                                           \
+    float8 across = (float8)(weight.s0) * COLUMN(0);                                                \
+    across = fma((float8)(weight.s1), COLUMN(1), across);                                           \
     across = fma((float8)(weight.s2), COLUMN(2), across);                                           \
     across = fma((float8)(weight.s3), COLUMN(3), across);                                           \
     across = fma((float8)(weight.s4), COLUMN(4), across);                                           \
     across = fma((float8)(weight.s5), COLUMN(5), across);                                           \
+    across = fma((float8)(weight.s6), COLUMN(6), across);                                           \
+    across = fma((float8)(weight.s7), COLUMN(7), across);                                           \
     sum##n = fma(taps(share_v), across, sum##n);                                                    \
   }
 
@@ -77,27 +79,27 @@ __kernel void cone_nodes(__global float* out, __global const float* table, __glo
                    v_plane = fma(v->step_v[0], dx, v->step_v[1] * dy);
 #if VDVR_UPRIGHT
         const REAL inverse = (REAL)1 / l_plane, u = fma(u_plane, inverse, v->part_u), whole_u = floor(u);
-        const int column = (int)v->whole_u + (int)whole_u - 2;
+        const int column = (int)v->whole_u + (int)whole_u - 3;
         const float8 weight_u = (float)(inverse * inverse) * taps((float)(u - whole_u - 0.5f));
 #else
         const SUM inverse = (REAL)1 / fma((SUM)(v->step_lambda[2]), dz, (SUM)(l_plane)),
                   u8 = fma(fma((SUM)(v->step_u[2]), dz, (SUM)(u_plane)), inverse, (SUM)(v->part_u)),
                   whole_u = floor(u8);
-        const INT column = (int)v->whole_u + TO_INT(whole_u) - 2;
+        const INT column = (int)v->whole_u + TO_INT(whole_u) - 3;
         const VEC g_u = NARROW(u8 - whole_u - 0.5f);
 #endif
 #if IN_RUNS
         const double slope = v->step_v[2] * inverse,
-                     lowest = fma(fma(v->step_v[2], dz, v_plane), inverse, v->part_v),
+                     lowest = fma(fma(v->step_v[2], dz, v_plane), inverse, v->part_v) - 0.5f,
                      middle = fma(slope, to_middle, lowest);
         const int cut = (int)middle;
         const VEC place = fma((VEC)((float)slope), from_middle, (VEC)((float)(middle - (double)cut))),
-                  below = floor(place), g_v = place - below - 0.5f;
-        const INT row = (int)v->whole_v + cut + TO_INT(below) - 2;
+                  nearest = (place + TO_WHOLE) - TO_WHOLE, g_v = place - nearest;
+        const INT row = (int)v->whole_v + cut + TO_INT(nearest) - 3;
 #else
         const SUM v8 = fma(fma((SUM)(v->step_v[2]), dz, (SUM)(v_plane)), (SUM)(inverse), (SUM)(v->part_v)),
                   whole_v = floor(v8);
-        const INT row = (int)v->whole_v + TO_INT(whole_v) - 2;
+        const INT row = (int)v->whole_v + TO_INT(whole_v) - 3;
         const VEC g_v = NARROW(v8 - whole_v - 0.5f);
 #endif
 #if VDVR_UPRIGHT

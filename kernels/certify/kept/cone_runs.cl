@@ -1,8 +1,8 @@
-// Kept nodes of cone beam where all detectors stand upright: u, lambda and the weights of six columns belong
-// to a whole column of nodes. They are applied once to the rows that a run of heights reads, which gives a
-// strip, and each height takes six rows of it (docs/error-bounds.md, section 16). Layouts and what is added
-// are those of cone_nodes.cl, to the bit. A work-item does a run of heights of some rows of a tile, some
-// views at a time: what they read stays in caches. In double precision only. Called by
+// Kept nodes of cone beam where all detectors stand upright: u, lambda and the weights of eight columns
+// belong to a whole column of nodes. They are applied once to the rows that a run of heights reads, which
+// gives a strip, and each height takes eight rows of it (docs/error-bounds.md, section 16). Layouts and what
+// is added are those of cone_nodes.cl, to the bit. A work-item does a run of heights of some rows of a tile,
+// some views at a time: what they read stays in caches. In double precision only. Called by
 // host/certify/kept/cone_tiles.cpp.
 #define VDVR_LANES 8
 #define VDVR_DOUBLE 1
@@ -12,14 +12,14 @@
 
 #define RUN VDVR_CONE_RUN
 #define GROUPS (RUN / VDVR_LANES)
-#if GROUPS != 4
-#error "the middles of a run's groups of heights are a vector of four"
+#if GROUPS != 8
+#error "the middles of a run's groups of heights are a vector of eight"
 #endif
 // Views whose strips are made together, and vectors of a strip.
 #define TOGETHER VDVR_CONE_VIEWS
 #define CHUNKS (VDVR_CONE_STRIP / 16)
 
-// What a column of nodes reads of a view: strip, and by height the first of six rows, and the place g
+// What a column of nodes reads of a view: strip, and by height the first of eight rows, and the place g
 // between the two in the middle. Arrays on purpose: what is taken from them by the element would
 // cost more from registers.
 typedef struct {
@@ -37,32 +37,38 @@ static ALWAYS_INLINE int floor_of(double v) {
 static ALWAYS_INLINE void make_strip(float16* to, __global const float* from, int stride, int chunks,
                                      float8 weight) {
   for (int c = 0; c < chunks; ++c, from += 16) {
-    float16 across = (float16)(weight.s1) * COLUMN(1);
-    across = fma((float16)(weight.s0), COLUMN(0), across);
+    float16 across = (float16)(weight.s0) * COLUMN(0);
+    across = fma((float16)(weight.s1), COLUMN(1), across);
     across = fma((float16)(weight.s2), COLUMN(2), across);
     across = fma((float16)(weight.s3), COLUMN(3), across);
     across = fma((float16)(weight.s4), COLUMN(4), across);
-    to[c] = fma((float16)(weight.s5), COLUMN(5), across);
+    across = fma((float16)(weight.s5), COLUMN(5), across);
+    across = fma((float16)(weight.s6), COLUMN(6), across);
+    to[c] = fma((float16)(weight.s7), COLUMN(7), across);
   }
 }
 
-// Heights follow one another `slope` rows apart, from `lowest` rows beyond row `whole` of the strip on. In
-// floats about the middle of eight.
+// Heights follow one another `slope` rows apart, the lowest half a row above `lowest` beyond row `whole` of
+// the strip: the row below a place is the nearest to what is half a row less. In floats about the middle of
+// eight.
 static ALWAYS_INLINE void place_heights(Seen* seen, double lowest, double slope, int whole, int last) {
-  const double4 middle = fma((double4)(slope), (double4)(3.5f, 11.5f, 19.5f, 27.5f), (double4)(lowest));
-  const int4 cuts = convert_int4(middle);
-  const float4 parts = convert_float4(middle - convert_double4(cuts));
+  const double8 middle = fma(
+      (double8)(slope), (double8)(3.5f, 11.5f, 19.5f, 27.5f, 35.5f, 43.5f, 51.5f, 59.5f), (double8)(lowest));
+  const int8 cuts = convert_int8(middle);
+  const float8 parts = convert_float8(middle - convert_double8(cuts));
   int cut[GROUPS];
   float part[GROUPS];
-  vstore4(cuts + whole, 0, cut);
-  vstore4(parts, 0, part);
-  const float8 from_middle = TO_VEC(INDEX) - 3.5f;
-  for (int j = 0; j < GROUPS; ++j) {
-    const float8 at = fma((float8)((float)slope), from_middle, (float8)(part[j]));
-    int8 below = convert_int8(at);
-    below += convert_float8(below) > at;  // true is -1
-    vstore8(at - convert_float8(below) - 0.5f, j, seen->g);
-    vstore8(clamp(below + cut[j], (int8)(0), (int8)(last)), j, seen->row);
+  vstore8(cuts + whole, 0, cut);
+  vstore8(parts, 0, part);
+  const float16 from_middle = (float16)(TO_VEC(INDEX), TO_VEC(INDEX)) - 3.5f;
+  for (int j = 0; j < GROUPS / 2; ++j) {
+    const float16 at = fma((float16)((float)slope), from_middle,
+                           (float16)((float8)(part[2 * j]), (float8)(part[2 * j + 1]))),
+                  nearest = at + TO_WHOLE, whole_rows = nearest - TO_WHOLE;
+    const int16 row =
+        as_int16(nearest) - as_int(TO_WHOLE) + (int16)((int8)(cut[2 * j]), (int8)(cut[2 * j + 1]));
+    vstore16(at - whole_rows, j, seen->g);
+    vstore16(clamp(row, (int16)(0), (int16)(last)), j, seen->row);
   }
 }
 
@@ -76,15 +82,16 @@ static ALWAYS_INLINE void look_at(Seen* seen, __global const float* plane, __glo
                lowest =
                    fma(fma(v->step_v[2], dz, fma(v->step_v[0], dx, v->step_v[1] * dy)), inverse, v->part_v),
                highest = fma(slope, (double)(heights - 1), lowest);
-  const int whole_u = floor_of(u), whole_v = (int)v->whole_v - 2,
-            column = clamp((int)v->whole_u + whole_u - 2, 0, last_column);
+  const int whole_u = floor_of(u), whole_v = (int)v->whole_v - 3,
+            column = clamp((int)v->whole_u + whole_u - 3, 0, last_column);
   // A row more on either side: floats may round to it.
   const int low = clamp(whole_v + floor_of(min(lowest, highest)) - 1, 0, last_row) / 16 * 16,
             high = clamp(whole_v + floor_of(max(lowest, highest)) + 1, 0, last_row) + VDVR_CONE_HEIGHTS,
             chunks = min((high - low + 15) / 16, CHUNKS);
   make_strip(seen->strip, plane + (size_t)column * column_stride + low, column_stride, chunks,
              (float)(inverse * inverse) * taps((float)(u - (double)whole_u - 0.5f)));
-  place_heights(seen, lowest, slope, whole_v - low, min(chunks * 16 - VDVR_CONE_HEIGHTS, last_row - low));
+  place_heights(seen, lowest - 0.5f, slope, whole_v - low,
+                min(chunks * 16 - VDVR_CONE_HEIGHTS, last_row - low));
 }
 
 #define FOR_PAIRS(DO) DO(0, 0, 1) DO(1, 2, 3) DO(2, 4, 5) DO(3, 6, 7)

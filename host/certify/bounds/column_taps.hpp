@@ -1,16 +1,19 @@
-// What interpolation by the six weights of kernels/shared/six_taps.h errs.
+// What interpolation by the six weights of kernels/shared/six_taps.h errs, and by the eight of eight_taps.h.
 #pragma once
 
-#include <array>
+#include <vector>
 
 namespace vdvr {
 
-/// The weights at f in [0, 1], in double precision from the coefficients as rounded to fp32; taps -2 .. 3.
-std::array<double, 6> six_taps(double f);
+/// The weights at f in [0, 1], in double precision from the coefficients as rounded to fp32: of taps -2 .. 3,
+/// and -3 .. 4.
+std::vector<double> six_taps(double f);
+std::vector<double> eight_taps(double f);
 
 /// Facts about them, for all f in [0, 1] at once. Unit of length: one column.
-struct SixTaps {
-  double band = 0;   // |w| <= pi / 8, radians a column: columns at 8x
+struct ColumnTaps {
+  int taps = 0;
+  double band = 0;   // |w| <= band, radians a column: six taps pi / 8, columns at 8x; eight pi / 6, at 6x
   double error = 0;  // of a wave of the band, of its amplitude: E
   double sup = 0;    // c: |interpolant - q| <= c sup |q| for every bounded q of the band
   double norm = 0;   // sum of the magnitudes
@@ -24,6 +27,7 @@ struct SixTaps {
 };
 
 /// Computed at the first call (some 50 ms), then kept.
-const SixTaps& six_tap_facts();
+const ColumnTaps& six_tap_facts();
+const ColumnTaps& eight_tap_facts();
 
 }  // namespace vdvr
