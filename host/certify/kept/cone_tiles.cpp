@@ -341,7 +341,9 @@ void ConeTiles::back_project(std::span<const ConePage> pages, const Progress& pr
 // --- bounds ---
 
 double ConeTiles::roundings_of_sum(std::int64_t views, std::int64_t together) {
-  return static_cast<double>(together + (views + together - 1) / together);
+  const std::int64_t at_once = std::min<std::int64_t>(together, VDVR_CONE_VIEWS),
+                     sums = (together + at_once - 1) / at_once, tables = (views + together - 1) / together;
+  return static_cast<double>(at_once + sums + tables);
 }
 
 ConeTiles::Errors ConeTiles::errors(std::int64_t together, Fp64 fp64) {
@@ -367,10 +369,9 @@ ConeTiles::Errors ConeTiles::errors(std::int64_t together, Fp64 fp64) {
   // they add up to, and the fractions of the middle and of each.
   const double apart = in_double ? unit_roundoff * (7 * row_step_ + 3) : 0.0;
   const double position = (2 * unit * (16 * block_reach_ + 4) + apart) * pi / density * sup_;
-  // Eight products along u and one along v, their sum over the views of a chunk, eight lanes, and chunks;
-  // lambda^-2, which a float place makes err more. Runs of heights add up eight views at a time: no more
-  // sums.
-  const double roundings = 8 + 1 + 3 + roundings_of_sum(g.views(), together) + (in_double ? 3 : 24);
+  // Twice four products along u and what they add up to, one along v, their sum over views, eight lanes;
+  // lambda^-2, which a float place makes err more.
+  const double roundings = 5 + 1 + 3 + roundings_of_sum(g.views(), together) + (in_double ? 3 : 24);
   out.rounding = square * entries + position + 2 * taps.norm * taps.rounding * sup_ +
                  1.01 * unit_roundoff * roundings * square * sup_ +
                  views * largest_weight_ * (2 * product_underflow(g, upsampler_.gain_u()) + 16 * 0x1p-126);

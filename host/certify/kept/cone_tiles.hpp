@@ -81,7 +81,7 @@ class ConeTiles {
   /// The same where memory had allowed so many views at once, from 1 to most_views, or on another device.
   [[nodiscard]] Errors errors(std::int64_t together, Fp64 fp64 = Fp64::as_here);
   static constexpr std::int64_t most_views = 16;
-  /// Roundings of a sum over views, of which so many are added up before they are added to the others.
+  /// Roundings of a sum over views: four in a lane, the lanes of so many in a sum, and those sums.
   [[nodiscard]] static double roundings_of_sum(std::int64_t views, std::int64_t together);
   /// Of an axis, x and y alike: designed for the band with which it errs least, most views being below the
   /// highest. Where a band exceeds what filters are designed for, none; `error` is infinite.

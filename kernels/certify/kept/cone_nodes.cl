@@ -15,15 +15,14 @@
   {                                                                                                 \
     __global const float* from =                                                                    \
         plane + (size_t)clamp(at_u, 0, s.last_column) * column_stride + clamp(at_v, 0, s.last_row); \
-    float8 across = (float8)(weight.s0) * COLUMN(0);                                                \
-    across = fma((float8)(weight.s1), COLUMN(1), across);                                           \
-    across = fma((float8)(weight.s2), COLUMN(2), across);                                           \
-    across = fma((float8)(weight.s3), COLUMN(3), across);                                           \
-    across = fma((float8)(weight.s4), COLUMN(4), across);                                           \
-    across = fma((float8)(weight.s5), COLUMN(5), across);                                           \
-    across = fma((float8)(weight.s6), COLUMN(6), across);                                           \
-    across = fma((float8)(weight.s7), COLUMN(7), across);                                           \
-    sum##n = fma(taps(share_v), across, sum##n);                                                    \
+    float8 left = (float8)(weight.s0) * COLUMN(0), right = (float8)(weight.s7) * COLUMN(7);         \
+    left = fma((float8)(weight.s1), COLUMN(1), left);                                               \
+    right = fma((float8)(weight.s6), COLUMN(6), right);                                             \
+    left = fma((float8)(weight.s2), COLUMN(2), left);                                               \
+    right = fma((float8)(weight.s5), COLUMN(5), right);                                             \
+    left = fma((float8)(weight.s3), COLUMN(3), left);                                               \
+    right = fma((float8)(weight.s4), COLUMN(4), right);                                             \
+    sum##n = fma(taps(share_v), left + right, sum##n);                                              \
   }
 
 #if VDVR_LANES > 8
