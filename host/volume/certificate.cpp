@@ -255,7 +255,8 @@ void read_noise(const Member& m, Certificate& c) {
 void read_method(const Member& m, Certificate& c) {
   const Member rates = m.at("rates"), field = m.at("field");
   c.rates.upsampling = rates.at("upsampling_u").rate();
-  c.rates.interpolation = rates.at("u_filter").choice(interpolation_of, "linear, cubic, six-taps or eight-taps");
+  c.rates.interpolation =
+      rates.at("u_filter").choice(interpolation_of, "linear, cubic, six-taps or eight-taps");
   c.rates.gold = rates.at("gold").rate();
   c.bounds = read_bounds(m.at("bounds"));
   c.field.filter = field.at("filter").choice(ramp_window_of, "ram-lak, shepp-logan, cosine, hamming or hann");
