@@ -112,7 +112,9 @@ OpenBricks open_bricks(const Plan& plan, const std::vector<float>& base, const I
                   "of the {:.4g} left for it; raise {} or allow at least {:.4g}",
                   to_world(in.plan.epsilon_abs, in.units), projection ? "the projections" : "gold",
                   to_world(static_cast<double>(slack), in.units), to_world(tolerance, in.units),
-                  projection ? "`upsampling`, or take `u_filter` six-taps," : "`gold`",
+                  !projection || in.plan.rates.interpolation == Interpolation::eight_taps
+                      ? "`gold`"
+                      : "`upsampling`, or take `u_filter` six-taps,",
                   to_world(in.plan.epsilon_abs + 1.1 * more, in.units)));
 }
 

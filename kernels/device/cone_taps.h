@@ -3,8 +3,7 @@
 #ifndef VDVR_CONE_TAPS_H
 #define VDVR_CONE_TAPS_H
 #include "device/lanes.h"
-#include "shared/eight_taps.h"
-#include "shared/six_taps.h"
+#include "shared/column_taps.h"
 
 // As host/certify/kept/cone_tiles.cpp fills it.
 typedef struct {
@@ -35,8 +34,8 @@ typedef struct {
 static inline __attribute__((always_inline)) float8 taps(float g) {
   const float s = g * g;
   return fma((float8)(g),
-             VDVR_SIX_FUSED_HORNER(float8, s, ODD_OF(FIRST_OF), ODD_OF(SECOND_OF), ODD_OF(THIRD_OF)),
-             VDVR_SIX_FUSED_HORNER(float8, s, EVEN_OF(FIRST_OF), EVEN_OF(SECOND_OF), EVEN_OF(THIRD_OF)));
+             VDVR_TAPS_FUSED_HORNER(float8, s, ODD_OF(FIRST_OF), ODD_OF(SECOND_OF), ODD_OF(THIRD_OF)),
+             VDVR_TAPS_FUSED_HORNER(float8, s, EVEN_OF(FIRST_OF), EVEN_OF(SECOND_OF), EVEN_OF(THIRD_OF)));
 }
 
 // Of two places, each of which fills one half of `g`.
@@ -44,10 +43,10 @@ static inline __attribute__((always_inline)) float8 taps(float g) {
 static inline __attribute__((always_inline)) float16 taps_of_two(float16 g) {
   const float16 s = g * g;
   return fma(g,
-             VDVR_SIX_FUSED_HORNER(float16, s, TWICE(ODD_OF(FIRST_OF)), TWICE(ODD_OF(SECOND_OF)),
-                                   TWICE(ODD_OF(THIRD_OF))),
-             VDVR_SIX_FUSED_HORNER(float16, s, TWICE(EVEN_OF(FIRST_OF)), TWICE(EVEN_OF(SECOND_OF)),
-                                   TWICE(EVEN_OF(THIRD_OF))));
+             VDVR_TAPS_FUSED_HORNER(float16, s, TWICE(ODD_OF(FIRST_OF)), TWICE(ODD_OF(SECOND_OF)),
+                                    TWICE(ODD_OF(THIRD_OF))),
+             VDVR_TAPS_FUSED_HORNER(float16, s, TWICE(EVEN_OF(FIRST_OF)), TWICE(EVEN_OF(SECOND_OF)),
+                                    TWICE(EVEN_OF(THIRD_OF))));
 }
 
 static inline __attribute__((always_inline)) float sum_of(float8 v) {

@@ -77,7 +77,7 @@ void check_reference(const ProjectionSet& scan, int rate, Interpolation filter, 
   back_project(device.state(), filtered.geometry, slab, blocks, filter, out);
   const auto q = read_back(slab);
   // A fused multiply-add per weight and view; cubic weights round up to 8 times themselves.
-  // Those of six are known as a sum (six_taps.hpp), of samples that do not exceed the largest.
+  // Those of six are known as a sum (column_taps.hpp), of samples that do not exceed the largest.
   const std::int64_t roundings = taps_of(filter) * slab.views + 8;
   const double weights = filter == Interpolation::six_taps ? six_tap_facts().rounding : 0;
   const double position = position_error(filtered.geometry, slab.columns, blocks);

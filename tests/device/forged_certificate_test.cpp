@@ -8,9 +8,11 @@
 #include <nlohmann/json.hpp>
 
 #include "host/verify/verify_attack.hpp"
+#include "tests/support/cone_scans.hpp"
 #include "tests/support/scans.hpp"
 #include "vdvr/expert/build.hpp"
 #include "vdvr/expert/certified_region.hpp"
+#include "vdvr/expert/certify.hpp"
 #include "vdvr/expert/exact_field.hpp"
 #include "vdvr/expert/verify.hpp"
 
@@ -65,10 +67,10 @@ const Made& made() {
 }
 
 /// What verify says of a certificate; "holds" if it does. A refusal is a finding too.
-std::string verdict(const Certificate& c, bool exhaustive = true) {
+std::string verdict(const Certificate& c, bool exhaustive = true, const Made& of = made()) {
   static Device device;
   try {
-    const VerifyResult r = verify(device, made().scan, made().volume, c, {exhaustive, 0.1, 3});
+    const VerifyResult r = verify(device, of.scan, of.volume, c, {exhaustive, 0.1, 3});
     BOOST_TEST(r.holds == r.failure.empty());
     return r.holds ? "holds" : r.failure;
   } catch (const Error& e) {
@@ -76,8 +78,8 @@ std::string verdict(const Certificate& c, bool exhaustive = true) {
   }
 }
 
-bool finds(const Certificate& c, const std::string& what, bool exhaustive = true) {
-  const std::string said = verdict(c, exhaustive);
+bool finds(const Certificate& c, const std::string& what, bool exhaustive = true, const Made& of = made()) {
+  const std::string said = verdict(c, exhaustive, of);
   BOOST_TEST_MESSAGE(said);
   return said.find(what) != std::string::npos;
 }
@@ -96,7 +98,50 @@ void lower_totals(Certificate& c, double to) {
   add_up(c);
 }
 
+/// Of cone beam, as the command line builds it.
+const Made& made_of_cone() {
+  static const Made one = [] {
+    Device device;
+    Made m;
+    m.scan = vdvr::testing::noisy_cone({.views = 12, .rows = 17, .columns = 15, .source_to_axis = 90}, 5);
+    CertifyOptions options;
+    options.grid.size = Index3{4, 4, 4};
+    options.build.storage = StorageChoice::f32;
+    BuildResult built = certify(device, m.scan, Tolerance{0.1, {}}, options);
+    m.volume = std::move(built.volume);
+    m.certificate = std::move(built.certificate);
+    m.certificate.sealed = true;
+    return m;
+  }();
+  return one;
+}
+
+/// As programs from before wrote their rates of cone beam.
+Certificate as_of_six_taps(Certificate c) {
+  c.rates.upsampling = 8;
+  c.rates.interpolation = Interpolation::six_taps;
+  Json options = Json::parse(c.options_json);
+  options["upsampling"] = 8;
+  options["u_filter"] = "six-taps";
+  c.options_json = options.dump();
+  return c;
+}
+
 }  // namespace
+
+// Files of earlier programs have other terms, and these are compared too: what is called older has them.
+BOOST_AUTO_TEST_CASE(a_certificate_of_cone_beam_cannot_be_called_an_older_one_to_promise_more) {
+  const Made& of = made_of_cone();
+  BOOST_TEST(verdict(of.certificate, true, of) == "holds");
+  Certificate older = as_of_six_taps(of.certificate);
+  BOOST_TEST(finds(older, "the projection term is", true, of));
+  older.budget.arithmetic.value *= 0.5;
+  add_up(older);
+  BOOST_TEST(finds(older, "the arithmetic term is", true, of));
+  Certificate other = of.certificate;
+  other.rates.upsampling = 8;
+  BOOST_TEST(finds(other, "upsampling", true, of));
+}
 
 BOOST_AUTO_TEST_CASE(a_right_certificate_is_confirmed) {
   BOOST_TEST(verdict(made().certificate) == "holds");

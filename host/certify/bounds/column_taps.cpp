@@ -1,19 +1,19 @@
 #include "host/certify/bounds/column_taps.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <numbers>
 
 #include "host/certify/bounds/node_functional.hpp"
-#include "shared/eight_taps.h"
-#include "shared/six_taps.h"
+#include "shared/column_taps.h"
 
 namespace vdvr {
 namespace {
 
-constexpr int halvings = 32;  // of f in [0, 1 / 2]: the weights at 1 - f are those at f, mirrored
-constexpr double apart = 0.5 / halvings;
+constexpr int steps_of_half = 32;  // of f in [0, 1 / 2]: the weights at 1 - f are those at f, mirrored
+constexpr double apart = 0.5 / steps_of_half;
 constexpr double bend = apart * apart / 8;  // times a second derivative: what a function rises between steps
 constexpr std::size_t powers = 6;           // of g in a weight
 
@@ -86,7 +86,8 @@ double over_all_places(const Polynomials& p, double w, const Of& of) {
   double largest = std::pow(w, 6);
   for (const std::size_t order : {4U, 2U, 0U}) {
     double at_steps = 0;
-    for (int s = 0; s <= halvings; ++s) at_steps = std::max(at_steps, of(functional(p, apart * s, order)));
+    for (int s = 0; s <= steps_of_half; ++s)
+      at_steps = std::max(at_steps, of(functional(p, apart * s, order)));
     largest = at_steps + bend * largest;
   }
   return largest;
@@ -101,7 +102,7 @@ void bound_sums(ColumnTaps& facts, const Polynomials& p) {
     bend_of_weights += bend * largest_derivative(p, tap, tap, 2);
     bend_of_part[tap] = bend * largest_derivative(p, 0, tap, 3);
   }
-  for (int s = 0; s <= 2 * halvings; ++s) {
+  for (int s = 0; s <= 2 * steps_of_half; ++s) {
     double norm = bend_of_weights, slope = 0, part = 0;
     for (const double w : derivatives(p, apart * s, 0)) norm += std::abs(w);
     const std::vector<double> slopes = derivatives(p, apart * s, 1);

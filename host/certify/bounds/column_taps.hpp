@@ -1,4 +1,4 @@
-// What interpolation by the six weights of kernels/shared/six_taps.h errs, and by the eight of eight_taps.h.
+// What interpolation by the six weights of kernels/shared/column_taps.h errs, and by the eight.
 #pragma once
 
 #include <vector>

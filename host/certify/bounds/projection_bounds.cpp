@@ -17,9 +17,9 @@
 #include "host/base/opencl/kernel.hpp"
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
+#include "host/certify/bounds/column_taps.hpp"
 #include "host/certify/bounds/dense_values.hpp"
 #include "host/certify/bounds/node_functional.hpp"
-#include "host/certify/bounds/column_taps.hpp"
 #include "host/field/fdk/region_parts.hpp"
 #include "vdvr/error.hpp"
 
@@ -402,8 +402,9 @@ ColumnWeights weights_of(Interpolation interpolation) {
     case Interpolation::cubic:
       return {4, 1.25, 4.0 / 3, 0, 0};
     case Interpolation::six_taps:
-    case Interpolation::eight_taps:  // not here: of cone beam
       break;
+    case Interpolation::eight_taps:
+      throw std::logic_error("columns of parallel beam have no eight taps");
   }
   const ColumnTaps& six = six_tap_facts();
   return {6, six.norm, six.slope, six.slope_sum, six.rounding};

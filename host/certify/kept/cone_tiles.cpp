@@ -346,9 +346,11 @@ double ConeTiles::roundings_of_sum(std::int64_t views, std::int64_t together) {
   return static_cast<double>(at_once + sums + tables);
 }
 
-ConeTiles::Errors ConeTiles::errors(std::int64_t together, Fp64 fp64) {
+ConeTiles::Errors ConeTiles::errors(std::int64_t together, Fp64 fp64, Interpolation of) {
   const ParallelGeometry& g = scan_.geometry;
-  const ColumnTaps& taps = eight_tap_facts();
+  const bool eight = of == Interpolation::eight_taps;
+  const ColumnTaps& taps = eight ? eight_tap_facts() : six_tap_facts();
+  const double rate = eight ? density : 8, finer = rate / density;  // columns and rows to a pixel
   const double square = taps.norm * taps.norm, views = static_cast<double>(g.views());
   Errors out;
   // I_u I_v - 1 = (I_u - 1) + I_u (I_v - 1).
@@ -367,8 +369,8 @@ ConeTiles::Errors ConeTiles::errors(std::int64_t together, Fp64 fp64) {
   const double unit = in_double ? 0x1p-53 : unit_roundoff;
   // Of a run of heights, places of eight are floats about their middle: a step three and a half times, what
   // they add up to, and the fractions of the middle and of each.
-  const double apart = in_double ? unit_roundoff * (7 * row_step_ + 3) : 0.0;
-  const double position = (2 * unit * (16 * block_reach_ + 4) + apart) * pi / density * sup_;
+  const double apart = in_double ? unit_roundoff * (7 * finer * row_step_ + 3) : 0.0;
+  const double position = (2 * unit * (16 * finer * block_reach_ + 4) + apart) * pi / rate * sup_;
   // Twice four products along u and what they add up to, one along v, their sum over views, eight lanes;
   // lambda^-2, which a float place makes err more.
   const double roundings = 5 + 1 + 3 + roundings_of_sum(g.views(), together) + (in_double ? 3 : 24);

@@ -78,8 +78,10 @@ class ConeTiles {
     double interpolation = 0, rounding = 0;
   };
   [[nodiscard]] Errors errors() { return errors(views_together_); }
-  /// The same where memory had allowed so many views at once, from 1 to most_views, or on another device.
-  [[nodiscard]] Errors errors(std::int64_t together, Fp64 fp64 = Fp64::as_here);
+  /// The same where memory had allowed so many views at once, from 1 to most_views, or on another device. Six
+  /// taps: what earlier programs charged, with tables at 8x; of rounding at least.
+  [[nodiscard]] Errors errors(std::int64_t together, Fp64 fp64 = Fp64::as_here,
+                              Interpolation taps = Interpolation::eight_taps);
   static constexpr std::int64_t most_views = 16;
   /// Roundings of a sum over views: four in a lane, the lanes of so many in a sum, and those sums.
   [[nodiscard]] static double roundings_of_sum(std::int64_t views, std::int64_t together);

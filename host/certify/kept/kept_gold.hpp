@@ -74,11 +74,15 @@ class KeptGold {
   [[nodiscard]] GoldLattice lattice(const Grid& grid, int rate) const;
   /// Cost: milliseconds for each new ratio.
   [[nodiscard]] GoldErrors errors(const GoldLattice& lattice);
+  /// The `interpolation` of these in files of earlier programs, whose cone beam has six taps.
+  [[nodiscard]] double interpolation_by(Interpolation taps, const GoldLattice& lattice);
   /// What fourth differences of gold on that lattice err, xx, yy, zz, xy, xz, yz: of F^, rounding included.
   [[nodiscard]] std::array<double, 6> fourth_errors(const GoldLattice& lattice);
   /// The least and the most that `rounding` of these would be: on this device whatever memory allows, which
-  /// of cone beam says how many views lie there together; else on any, with double precision or without.
-  [[nodiscard]] std::pair<double, double> rounding_elsewhere(const GoldLattice& lattice, bool this_device);
+  /// of cone beam says how many views lie there together; else on any, with double precision or without. Of
+  /// files with six taps only the least is known.
+  [[nodiscard]] std::pair<double, double> rounding_elsewhere(const GoldLattice& lattice, bool this_device,
+                                                             Interpolation taps);
 
   /// How all that can be kept would lie in memory that other devices of this machine have too; none where
   /// this device does not compute in the host's memory, where it would take most of what is left, or where
@@ -218,6 +222,7 @@ class KeptGold {
     double filters = 0, rounding = 0;
   };
   ConeParts cone_parts(const GoldFilter& x, const GoldFilter& y, const GoldFilter& z);
+  double norm_of_filters(const GoldLattice& lattice);
   GoldErrors cone_errors(const GoldLattice& lattice);
   GoldErrors parallel_errors(const GoldLattice& lattice, Fp64 fp64);
   void back_project_heights(std::span<const TileAt> tiles, const Progress& progress);

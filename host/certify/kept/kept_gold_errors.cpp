@@ -84,7 +84,15 @@ std::array<double, 6> KeptGold::fourth_errors(const GoldLattice& lattice) {
   return out;
 }
 
-std::pair<double, double> KeptGold::rounding_elsewhere(const GoldLattice& lattice, bool this_device) {
+double KeptGold::interpolation_by(Interpolation taps, const GoldLattice& lattice) {
+  const double own = errors(lattice).interpolation;
+  if (!cone_ || taps == Interpolation::eight_taps) return own;
+  return own + norm_of_filters(lattice) *
+                   (cone_->errors(1, Fp64::as_here, taps).interpolation - cone_->errors().interpolation);
+}
+
+std::pair<double, double> KeptGold::rounding_elsewhere(const GoldLattice& lattice, bool this_device,
+                                                       Interpolation taps) {
   const double own = errors(lattice).rounding;
   std::pair<double, double> out{own, own};
   const auto take = [&](double other) { out = {std::min(out.first, other), std::max(out.second, other)}; };
@@ -95,14 +103,17 @@ std::pair<double, double> KeptGold::rounding_elsewhere(const GoldLattice& lattic
       take(parallel_errors(lattice, fp64).rounding);
       continue;
     }
-    const double nodes = filter_of(lattice.phases[0], 0).norm * filter_of(lattice.phases[1], 1).norm *
-                         filter_of(lattice.phases[2], 2).norm,
-                 now = cone_->errors().rounding;
+    const double nodes = norm_of_filters(lattice), now = cone_->errors().rounding;
     for (std::int64_t together = 1; together <= std::min(scan_.geometry.views(), ConeTiles::most_views);
          ++together)
-      take(own + nodes * (cone_->errors(together, fp64).rounding - now));
+      take(own + nodes * (cone_->errors(together, fp64, taps).rounding - now));
   }
   return out;
+}
+
+double KeptGold::norm_of_filters(const GoldLattice& lattice) {
+  return filter_of(lattice.phases[0], 0).norm * filter_of(lattice.phases[1], 1).norm *
+         filter_of(lattice.phases[2], 2).norm;
 }
 
 GoldErrors KeptGold::errors(const GoldLattice& lattice) {

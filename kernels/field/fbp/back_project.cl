@@ -11,7 +11,7 @@
 // host/field/fbp/back_project.cpp.
 #include "device/lanes.h"
 #include "shared/back_project.h"
-#include "shared/six_taps.h"
+#include "shared/column_taps.h"
 
 #ifndef VDVR_TAPS
 #error "VDVR_TAPS must be 2 (linear in u), 4 (cubic) or 6"
@@ -186,12 +186,12 @@ __kernel void back_project(__global float* out, __global const float* filtered, 
 #endif
 #if VDVR_TAPS == 6
           const TILE m = f - 0.5f, square = m * m;
-          const TILE even_a = VDVR_SIX_FUSED(TILE, square, VDVR_SIX_EVEN_A),
-                     odd_a = m * VDVR_SIX_FUSED(TILE, square, VDVR_SIX_ODD_A),
-                     even_b = VDVR_SIX_FUSED(TILE, square, VDVR_SIX_EVEN_B),
-                     odd_b = m * VDVR_SIX_FUSED(TILE, square, VDVR_SIX_ODD_B),
-                     even_c = VDVR_SIX_FUSED(TILE, square, VDVR_SIX_EVEN_C),
-                     odd_c = m * VDVR_SIX_FUSED(TILE, square, VDVR_SIX_ODD_C);
+          const TILE even_a = VDVR_TAPS_FUSED(TILE, square, VDVR_SIX_EVEN_A),
+                     odd_a = m * VDVR_TAPS_FUSED(TILE, square, VDVR_SIX_ODD_A),
+                     even_b = VDVR_TAPS_FUSED(TILE, square, VDVR_SIX_EVEN_B),
+                     odd_b = m * VDVR_TAPS_FUSED(TILE, square, VDVR_SIX_ODD_B),
+                     even_c = VDVR_TAPS_FUSED(TILE, square, VDVR_SIX_EVEN_C),
+                     odd_c = m * VDVR_TAPS_FUSED(TILE, square, VDVR_SIX_ODD_C);
           const TILE w0 = even_a + odd_a, w1 = even_b + odd_b, w2 = even_c + odd_c, w3 = even_c - odd_c,
                      w4 = even_b - odd_b, w5 = even_a - odd_a;
           const ITILE at = (clamp((int)step.w + below, (ITILE)2, (ITILE)(columns - 4)) - 2) * 16;
