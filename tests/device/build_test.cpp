@@ -7,6 +7,7 @@
 #include <set>
 #include <string>
 
+#include "host/base/opencl/state.hpp"
 #include "host/volume/sampler/sampler_terms.hpp"
 #include "tests/reference/mixed_field.hpp"
 #include "tests/support/device.hpp"
@@ -53,7 +54,7 @@ Built build_of(const ProjectionSet& scan, const Wanted& wanted) {
   if (!wanted.epsilon_abs) tolerance.relative = wanted.epsilon;
   Plan plan = make_plan(device, scan, wanted.grid, {}, wanted.rates, tolerance, settings);
   BuildResult result = build(device, scan, plan, wanted.options);
-  if (wanted.max_memory > 0) BOOST_TEST(device.peak_memory() <= wanted.max_memory);
+  if (wanted.max_memory > 0) BOOST_TEST(device.state().memory.peak_of_one() <= wanted.max_memory);
   return {std::move(plan), std::move(result)};
 }
 

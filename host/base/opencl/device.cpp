@@ -97,6 +97,11 @@ std::uint64_t MemoryAccount::peak() const {
   return shared_ ? host_.peak : host_.peak + device_.peak;
 }
 
+std::uint64_t MemoryAccount::peak_of_one() const {
+  const std::lock_guard guard(lock_);
+  return std::max(host_.peak, device_.peak);
+}
+
 std::uint64_t MemoryAccount::left() const {
   const std::lock_guard guard(lock_);
   return device_side().room();

@@ -37,6 +37,8 @@ class MemoryAccount {
   void give_host(std::uint64_t bytes) noexcept;
   /// Of both together.
   [[nodiscard]] std::uint64_t peak() const;
+  /// Of the one that came to more: what --max-memory limits.
+  [[nodiscard]] std::uint64_t peak_of_one() const;
   /// For allocations on the device.
   [[nodiscard]] std::uint64_t left() const;
   [[nodiscard]] std::uint64_t host_left() const;
