@@ -105,34 +105,41 @@ class TestedBricks {
         now_(volume.level.size()) {}
 
   /// Tests bricks at the first rate at which they can be, and those that it leaves undecided, or that are
-  /// `looked_at`, on finer gold made of the same nodes.
+  /// looked at there too (`looked_at` is 2), on finer gold: of its own nodes as long as that is less work,
+  /// then made of those.
   void sweep(const std::vector<std::uint8_t>& selected, const std::vector<std::uint8_t>& looked_at,
              VerifyResult& result) {
-    const int first = std::min(volume_.rate, field_.across());
-    std::vector<int> rates{first};
-    // Gold coarser than the nodes that determine F is its own.
-    if (first == field_.across())
-      while (rates.back() < std::min(finest_rate(volume_), std::max(2 * volume_.rate, 4 * first)))
-        rates.push_back(2 * rates.back());
+    const bool dear = field_.nodes_are_dear();
+    // Gold coarser than the nodes that determine F is its own, and an eighth of the nodes.
+    const int own = std::min(volume_.rate, field_.across()), first = dear ? std::max(1, own / 2) : own;
+    std::vector<int> finer;
+    if (own == field_.across())
+      for (int rate = 2 * own; rate <= std::min(finest_rate(volume_), std::max(2 * volume_.rate, 4 * own));
+           rate *= 2)
+        finer.push_back(rate);
+    const int last = finer.empty() ? own : finer.back();
     const auto wants = [&](std::size_t i, int rate) {
       take(i);
       const Brick& b = bricks_[i];
-      if (b.tried == 0) return rate >= field_.least_rate(i) || rate == rates.back();
-      return undecided(i) || (looked_at[i] && b.rate == b.tried && b.total >= 0 && 2 * b.tried == rate &&
-                              rate <= 2 * std::max(first, field_.least_rate(i)));
+      if (b.tried == 0) return rate >= field_.least_rate(i) || rate == last;
+      return undecided(i) || (looked_at[i] > 1 && b.rate == b.tried && b.total >= 0 && 2 * b.tried == rate &&
+                              rate <= 2 * std::max(own, field_.least_rate(i)));
     };
-    if (!field_.nodes_are_dear()) return run(selected, rates, wants, result);
+    std::vector<std::vector<int>> steps{{own}};
+    if (!dear) steps.front().insert(steps.front().end(), finer.begin(), finer.end());
     // Few bricks need what finer gold needs around them.
-    run(selected, {first}, wants, result);
-    rates.erase(rates.begin());
-    if (rates.empty()) return;
+    else if (!finer.empty()) steps.push_back(finer);
+    if (first < own) steps.insert(steps.begin(), {first});
     std::vector<std::uint8_t> rest = selected;
-    for (std::size_t i = 0; i < rest.size(); ++i) {
-      const bool tested = bricks_[i].tried > 0 || field_.least_rate(i) > first;
-      rest[i] = rest[i] && tested &&
-                std::any_of(rates.begin(), rates.end(), [&](int rate) { return wants(i, rate); });
+    int before = 0;
+    for (const std::vector<int>& rates : steps) {
+      // Nodes are made for all that a run is given.
+      for (std::size_t i = 0; i < rest.size() && before > 0; ++i)
+        rest[i] = rest[i] && (bricks_[i].tried > 0 || field_.least_rate(i) > before) &&
+                  std::any_of(rates.begin(), rates.end(), [&](int rate) { return wants(i, rate); });
+      if (std::find(rest.begin(), rest.end(), 1) != rest.end()) run(rest, rates, wants, result);
+      before = rates.back();
     }
-    if (std::find(rest.begin(), rest.end(), 1) != rest.end()) run(rest, rates, wants, result);
   }
 
   /// Tests bricks again on finer gold, the worst first, until none may err by more than the limits. Ends

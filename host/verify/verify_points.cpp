@@ -27,7 +27,7 @@ FieldPoints::FieldPoints(const ExactField& exact, const CertifiedRegion& region,
   const bool cone = !exact.views().empty();
   const double row = static_cast<double>(g.views() * g.columns),
                point = cone ? row * static_cast<double>(g.rows) : row;
-  // Each brick is looked at on two golds, at a height of each.
+  // Each brick is looked at on two golds or more, of cone beam most on one, at a height of each.
   const auto wanted =
       std::clamp(static_cast<std::int64_t>(most_work / (2 * row * static_cast<double>(g.rows))), least_bricks,
                  most_bricks);
@@ -45,7 +45,9 @@ FieldPoints::FieldPoints(const ExactField& exact, const CertifiedRegion& region,
   std::mt19937 random(seed);
   std::shuffle(bricks_.begin(), bricks_.end(), random);
   bricks_.resize(std::min(bricks_.size(), at(wanted)));
-  for (const std::size_t i : bricks_) flags_[i] = 1;
+  // Interpolated gold of cone beam takes nodes around a brick, many more than its own.
+  const std::size_t interpolated = cone ? at(least_bricks) : bricks_.size();
+  for (std::size_t i = 0; i < bricks_.size(); ++i) flags_[bricks_[i]] = i < interpolated ? 2 : 1;
 }
 
 FieldPoints::Outcome FieldPoints::compare(const ExactField& exact, std::span<const VerifyField::Node> nodes,

@@ -18,11 +18,12 @@ namespace vdvr {
 class FieldPoints {
  public:
   /// Draws bricks among the selected ones whose middle lies in the region. Few where F is dear: some 1e9
-  /// multiply-adds in all, but for at least four bricks and 64 nodes of each (8 of cone beam), at two rates.
+  /// multiply-adds in all, but for at least four bricks and 64 nodes of each (8 of cone beam) at each rate.
   FieldPoints(const ExactField& exact, const CertifiedRegion& region, const MixedVolume& volume,
               const std::vector<std::uint8_t>& selected, unsigned seed);
 
   [[nodiscard]] const std::vector<std::size_t>& bricks() const { return bricks_; }
+  /// 1 for each of these bricks, 2 for those of them that are looked at on interpolated gold too.
   [[nodiscard]] const std::vector<std::uint8_t>& flags() const { return flags_; }
   [[nodiscard]] std::int64_t nodes_each() const { return nodes_each_; }
 

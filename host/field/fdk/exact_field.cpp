@@ -44,16 +44,69 @@ double absolute_sum(std::span<const double> values) {
 // Trigonometric interpolation in 2n points makes errors at them grow by no more.
 double growth(std::int64_t n) { return 2 / pi * std::log(2.0 * static_cast<double>(n)) + 1.5; }
 
-// Clenshaw's recurrence for sum_m a[m * stride] cos(m x).
-double cosine_sum(const double* a, std::int64_t n, double x) {
-  const double c = 2 * std::cos(x);
-  double b1 = 0, b2 = 0;
-  for (std::int64_t m = n - 1; m > 0; --m) {
-    const double b0 = a[m] + c * b1 - b2;
-    b2 = b1;
-    b1 = b0;
+// Points, or heights, side by side, whatever vectors the processor has.
+constexpr std::size_t group = 8;
+typedef double Eight __attribute__((vector_size(group * sizeof(double)), aligned(8), may_alias));
+const Eight& eight_at(const double* p) { return *reinterpret_cast<const Eight*>(p); }
+Eight& eight_at(double* p) { return *reinterpret_cast<Eight*>(p); }
+
+// waves[l][i] = cos(l x[i]) for l < n, turned on from one l to the next.
+VDVR_WIDE void turn_on(const double* cosine, const double* sine, std::int64_t n, double* waves) {
+  const Eight c = eight_at(cosine), s = eight_at(sine);
+  Eight re = c - c + 1, im = s - s;
+  for (std::int64_t l = 0; l < n; ++l) {
+    eight_at(waves + l * static_cast<std::int64_t>(group)) = re;
+    const Eight next = re * c - im * s;
+    im = im * c + re * s;
+    re = next;
   }
-  return a[0] + 0.5 * c * b1 - b2;
+}
+
+// sums[m][i] = sum over l of a[m][l] waves[l][i]. One sum after the other would wait for each of its
+// additions: four columns' take turns.
+VDVR_WIDE void sum_columns(const double* a, std::int64_t columns, std::int64_t rows, const double* waves,
+                           double* sums) {
+  constexpr auto step = static_cast<std::int64_t>(group);
+  std::int64_t m = 0;
+  for (; m + 4 <= columns; m += 4) {
+    Eight s0{}, s1{}, s2{}, s3{};
+    const double* of = a + m * rows;
+    for (std::int64_t l = 0; l < rows; ++l, ++of) {
+      const Eight wave = eight_at(waves + l * step);
+      s0 += of[0] * wave;
+      s1 += of[rows] * wave;
+      s2 += of[2 * rows] * wave;
+      s3 += of[3 * rows] * wave;
+    }
+    eight_at(sums + m * step) = s0;
+    eight_at(sums + (m + 1) * step) = s1;
+    eight_at(sums + (m + 2) * step) = s2;
+    eight_at(sums + (m + 3) * step) = s3;
+  }
+  for (; m < columns; ++m) {
+    Eight sum{};
+    for (std::int64_t l = 0; l < rows; ++l) sum += a[m * rows + l] * eight_at(waves + l * step);
+    eight_at(sums + m * step) = sum;
+  }
+}
+
+// sum over m of lines[m][i] waves[m][i].
+VDVR_WIDE void sum_lines(const double* lines, const double* waves, std::int64_t n, double* out) {
+  Eight sum{};
+  for (std::int64_t i = 0; i < n * static_cast<std::int64_t>(group); i += static_cast<std::int64_t>(group))
+    sum += eight_at(lines + i) * eight_at(waves + i);
+  eight_at(out) = sum;
+}
+
+// cos(l pi (place + 1/2) / n) for l < n of each place: [l][place].
+void put_waves(const std::array<double, group>& places, std::int64_t n, std::vector<double>& waves) {
+  std::array<double, group> cosine{}, sine{};
+  for (std::size_t i = 0; i < group; ++i) {
+    const double x = pi * (places[i] + 0.5) / static_cast<double>(n);
+    cosine[i] = std::cos(x);
+    sine[i] = std::sin(x);
+  }
+  turn_on(cosine.data(), sine.data(), n, waves.data());
 }
 
 // [i][m] of table[m][i].
@@ -165,9 +218,9 @@ ExactField::ExactField(const ProjectionSet& scan, const FieldOptions& field, con
       }
     // docs/error-bounds.md, "What verify does": convolution, both transforms, and sums over coefficients.
     const auto u = static_cast<double>(U), v = static_cast<double>(V);
-    rounding[at(k)] = 0x1p-53 * ((u + 8) * kernel_norm * largest_sample * growth(U) * growth(V) +
-                                 2 * (u + 8) * row_norm * growth(V) + 2 * (v + 8) * rows_norm +
-                                 (2 * u + 10 * v + 32) * norm);
+    rounding[at(k)] =
+        0x1p-53 * ((u + 8) * kernel_norm * largest_sample * growth(U) * growth(V) +
+                   2 * (u + 8) * row_norm * growth(V) + 2 * (v + 8) * rows_norm + 30 * (u + v + 1) * norm);
   });
   coefficients_ = coefficients;
   rounding_ = std::accumulate(rounding.begin(), rounding.end(), 0.0);
@@ -176,33 +229,28 @@ ExactField::ExactField(const ProjectionSet& scan, const FieldOptions& field, con
 // lambda^-2 times the series in u and v, view by view.
 // Some points go together: a view's coefficients are read once for all of them, and sums run side by side.
 std::vector<double> ExactField::at_cone(std::span<const Vec3> points, const Progress& progress) const {
-  constexpr std::size_t group = 8;
   const std::int64_t U = geometry_.columns, V = geometry_.rows;
-  const auto columns = static_cast<std::size_t>(U), rows = static_cast<std::size_t>(V);
   std::vector<double> values(points.size());
   const auto groups = static_cast<std::int64_t>((points.size() + group - 1) / group);
   parallel_for(groups, progress, "exact points", [&](std::int64_t g) {
     const std::size_t first = static_cast<std::size_t>(g) * group,
                       count = std::min(group, points.size() - first);
-    std::vector<double> lines(group * columns), basis(rows * group);  // [point][m], [l][point]
-    std::array<Vec3, group> seen{};
+    std::vector<double> lines(group * static_cast<std::size_t>(U)), along_u(lines.size()),
+        along_v(group * static_cast<std::size_t>(V));
+    std::array<double, group> u{}, v{}, lambda{}, sums{};
     for (std::size_t k = 0; k < views_.size(); ++k) {
-      for (std::size_t i = 0; i < count; ++i) seen[i] = projected(views_[k], points[first + i]);
-      for (std::size_t l = 0; l < rows; ++l)
-        for (std::size_t i = 0; i < count; ++i)
-          basis[l * group + i] =
-              std::cos(static_cast<double>(l) * pi * (seen[i][1] + 0.5) / static_cast<double>(V));
-      for (std::size_t m = 0; m < columns; ++m) {
-        const double* a = coefficients_.get() + (k * columns + m) * rows;
-        std::array<double, group> sums{};
-        for (std::size_t l = 0; l < rows; ++l)
-          for (std::size_t i = 0; i < group; ++i) sums[i] += a[l] * basis[l * group + i];
-        for (std::size_t i = 0; i < count; ++i) lines[i * columns + m] = sums[i];
+      for (std::size_t i = 0; i < count; ++i) {
+        const Vec3 seen = projected(views_[k], points[first + i]);
+        u[i] = seen[0];
+        v[i] = seen[1];
+        lambda[i] = seen[2];
       }
-      for (std::size_t i = 0; i < count; ++i)
-        values[first + i] +=
-            cosine_sum(lines.data() + i * columns, U, pi * (seen[i][0] + 0.5) / static_cast<double>(U)) /
-            (seen[i][2] * seen[i][2]);
+      put_waves(u, U, along_u);
+      put_waves(v, V, along_v);
+      sum_columns(coefficients_.get() + static_cast<std::int64_t>(k) * U * V, U, V, along_v.data(),
+                  lines.data());
+      sum_lines(lines.data(), along_u.data(), U, sums.data());
+      for (std::size_t i = 0; i < count; ++i) values[first + i] += sums[i] / (lambda[i] * lambda[i]);
     }
   });
   return values;
@@ -216,36 +264,37 @@ std::vector<double> ExactField::at(std::span<const Vec3> points, const Progress&
   std::vector<std::pair<double, const std::vector<std::size_t>*>> heights;
   for (const auto& [z, members] : by_height) heights.emplace_back(z, &members);
 
-  // Heights go together in groups, so that one pass over the coefficients serves the whole group and the
-  // innermost sums run side by side.
-  constexpr std::size_t group = 16;
+  // Heights go together in groups, so that one pass over the coefficients serves the whole group.
   std::vector<double> values(points.size());
   const auto groups = static_cast<std::int64_t>((heights.size() + group - 1) / group);
   parallel_for(groups, progress, "exact points", [&](std::int64_t g) {
     const std::size_t first = static_cast<std::size_t>(g) * group,
                       count = std::min(group, heights.size() - first);
-    const auto rows = static_cast<std::size_t>(V), columns = static_cast<std::size_t>(U);
-    std::vector<double> basis(rows * group), line(columns * group);  // [l][height], [height][m]
+    std::vector<double> along_v(group * static_cast<std::size_t>(V)),
+        lines(group * static_cast<std::size_t>(U)), columns(lines.size()), along_u(lines.size());
+    std::array<double, group> places{}, sums{};
+    std::vector<std::pair<std::size_t, std::size_t>> members;  // height of the group, point
     for (std::size_t h = 0; h < count; ++h) {
-      const double row = heights[first + h].first / geometry_.pitch_v + 0.5 * static_cast<double>(V - 1);
-      const double y = pi * (row + 0.5) / static_cast<double>(V);
-      for (std::size_t l = 0; l < rows; ++l) basis[l * group + h] = std::cos(static_cast<double>(l) * y);
+      places[h] = heights[first + h].first / geometry_.pitch_v + 0.5 * static_cast<double>(V - 1);
+      for (const std::size_t i : *heights[first + h].second) members.emplace_back(h, i);
     }
+    put_waves(places, V, along_v);
     for (std::size_t k = 0; k < static_cast<std::size_t>(K); ++k) {
       const double c = std::cos(geometry_.theta_rad[k]), s = std::sin(geometry_.theta_rad[k]);
-      for (std::size_t m = 0; m < columns; ++m) {
-        const double* a = coefficients_.get() + (k * columns + m) * rows;
-        std::array<double, group> sum{};
-        for (std::size_t l = 0; l < rows; ++l)
-          for (std::size_t h = 0; h < group; ++h) sum[h] += a[l] * basis[l * group + h];
-        for (std::size_t h = 0; h < count; ++h) line[h * columns + m] = sum[h];
-      }
-      for (std::size_t h = 0; h < count; ++h)
-        for (const std::size_t i : *heights[first + h].second) {
-          const double t = points[i][0] * c + points[i][1] * s;
-          const double column = t / geometry_.pitch_u + geometry_.center_of_view(k);
-          values[i] += cosine_sum(line.data() + h * columns, U, pi * (column + 0.5) / static_cast<double>(U));
+      sum_columns(coefficients_.get() + static_cast<std::int64_t>(k) * U * V, U, V, along_v.data(),
+                  lines.data());
+      for (std::size_t from = 0; from < members.size(); from += group) {
+        const std::size_t together = std::min(group, members.size() - from);
+        for (std::size_t j = 0; j < together; ++j) {
+          const Vec3& p = points[members[from + j].second];
+          places[j] = (p[0] * c + p[1] * s) / geometry_.pitch_u + geometry_.center_of_view(k);
+          for (std::size_t m = 0; m < static_cast<std::size_t>(U); ++m)
+            columns[m * group + j] = lines[m * group + members[from + j].first];
         }
+        put_waves(places, U, along_u);
+        sum_lines(columns.data(), along_u.data(), U, sums.data());
+        for (std::size_t j = 0; j < together; ++j) values[members[from + j].second] += sums[j];
+      }
     }
   });
   return values;
