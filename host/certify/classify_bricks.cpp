@@ -10,8 +10,9 @@
 namespace vdvr {
 namespace {
 
-// Of the tolerance: a brick whose coarse slack takes more is not measured on coarse gold once it is refined.
-constexpr double easy_share = 0.48;
+// Of the tolerance: a brick whose coarse slack takes more is not measured on coarse gold once it is refined,
+// since levels pay for what that takes. The smaller projection term of cone beam makes more bricks easy.
+constexpr double easy_share = 0.48, easy_share_of_cone = 0.4;
 // Of the bricks: how many at most the search for the largest error measures again at once.
 constexpr std::size_t sharpened_share = 32;
 
@@ -64,7 +65,8 @@ ClassifyBricks::ClassifyBricks(JournalledRates& gold, OpenBricks& bricks, HostMe
       refuse_(std::move(refuse)) {}
 
 bool ClassifyBricks::is_easy(std::size_t brick, double tolerance) const {
-  return coarse_slack_[brick] >= 0 && static_cast<double>(coarse_slack_[brick]) <= easy_share * tolerance;
+  const double share = fine_.gold().source()->kept.of_cone_beam() ? easy_share_of_cone : easy_share;
+  return coarse_slack_[brick] >= 0 && static_cast<double>(coarse_slack_[brick]) <= share * tolerance;
 }
 
 void ClassifyBricks::classify(const DeviceField& base, const NodeTolerance& tolerance,

@@ -67,6 +67,7 @@ class KeptGold {
   /// How far outside the covered region gold of cone beam has the bounds of errors(), by axis. Farther out,
   /// where a view's source may be near, it is only finite.
   [[nodiscard]] Vec3 claimed() const;
+  [[nodiscard]] bool of_cone_beam() const { return cone_.has_value(); }
   /// In u.
   [[nodiscard]] Interpolation interpolation() const { return interpolation_; }
   /// Of gold at `rate` of a grid with the same origin whose cells are powers of two of this one's. Throws
