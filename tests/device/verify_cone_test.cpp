@@ -305,6 +305,8 @@ BOOST_AUTO_TEST_CASE(a_valid_certificate_holds) {
   BOOST_TEST(r.differences.empty());
   BOOST_TEST(r.measured_max <= built().result.certificate.measured_max + r.arithmetic);
   BOOST_TEST(r.field_points > 100);
+  // Nodes that are interpolated are looked at too.
+  BOOST_TEST(r.finest_rate > built().result.volume.rate);
   BOOST_TEST(r.field_share <= 1);
   BOOST_TEST_MESSAGE("total " << r.total << ", certified " << built().result.certificate.total_buffer);
 }
