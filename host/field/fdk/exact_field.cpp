@@ -218,9 +218,9 @@ ExactField::ExactField(const ProjectionSet& scan, const FieldOptions& field, con
       }
     // docs/error-bounds.md, "What verify does": convolution, both transforms, and sums over coefficients.
     const auto u = static_cast<double>(U), v = static_cast<double>(V);
-    rounding[at(k)] =
-        0x1p-53 * ((u + 8) * kernel_norm * largest_sample * growth(U) * growth(V) +
-                   2 * (u + 8) * row_norm * growth(V) + 2 * (v + 8) * rows_norm + 30 * (u + v + 1) * norm);
+    rounding[at(k)] = 0x1p-53 * ((u + 8) * kernel_norm * largest_sample * growth(U) * growth(V) +
+                                 2 * (u + 8) * row_norm * growth(V) + 2 * (v + 8) * rows_norm +
+                                 (scan.cone ? 160 : 30) * (u + v + 1) * norm);
   });
   coefficients_ = coefficients;
   rounding_ = std::accumulate(rounding.begin(), rounding.end(), 0.0);
