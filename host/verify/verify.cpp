@@ -125,17 +125,18 @@ class TestedBricks {
       return undecided(i) || (looked_at[i] > 1 && b.rate == b.tried && b.total >= 0 && 2 * b.tried == rate &&
                               rate <= 2 * std::max(own, field_.least_rate(i)));
     };
-    std::vector<std::vector<int>> steps{{own}};
-    if (!dear) steps.front().insert(steps.front().end(), finer.begin(), finer.end());
-    // Few bricks need what finer gold needs around them.
-    else if (!finer.empty()) steps.push_back(finer);
-    if (first < own) steps.insert(steps.begin(), {first});
-    std::vector<std::uint8_t> rest = selected;
+    // Rates whose gold is made of the same nodes. Few bricks need what finer gold needs around them.
+    std::vector<std::vector<int>> steps;
+    if (first < own) steps.push_back({first});
+    steps.push_back({own});
+    if (dear && !finer.empty()) steps.emplace_back();
+    steps.back().insert(steps.back().end(), finer.begin(), finer.end());
+    std::vector<std::uint8_t> rest(selected.size());
     int before = 0;
     for (const std::vector<int>& rates : steps) {
       // Nodes are made for all that a run is given.
-      for (std::size_t i = 0; i < rest.size() && before > 0; ++i)
-        rest[i] = rest[i] && (bricks_[i].tried > 0 || field_.least_rate(i) > before) &&
+      for (std::size_t i = 0; i < rest.size(); ++i)
+        rest[i] = selected[i] && (bricks_[i].tried > 0 || field_.least_rate(i) > before) &&
                   std::any_of(rates.begin(), rates.end(), [&](int rate) { return wants(i, rate); });
       if (std::find(rest.begin(), rest.end(), 1) != rest.end()) run(rest, rates, wants, result);
       before = rates.back();

@@ -15,7 +15,7 @@ namespace vdvr {
 namespace {
 
 constexpr double most_work = 5e8;  // multiply-adds for heights, and for points
-constexpr std::int64_t least_bricks = 4, most_bricks = 32, least_nodes = 64, least_cone_nodes = 8,
+constexpr std::int64_t least_bricks = 4, most_bricks = 32, least_nodes = 64, least_cone_nodes = 16,
                        most_points = 4096;
 
 }  // namespace

@@ -18,7 +18,7 @@ namespace vdvr {
 class FieldPoints {
  public:
   /// Draws bricks among the selected ones whose middle lies in the region. Few where F is dear: some 1e9
-  /// multiply-adds in all, but for at least four bricks and 64 nodes of each (8 of cone beam) at each rate.
+  /// multiply-adds in all, but for at least four bricks and 64 nodes of each (16 of cone beam) at each rate.
   FieldPoints(const ExactField& exact, const CertifiedRegion& region, const MixedVolume& volume,
               const std::vector<std::uint8_t>& selected, unsigned seed);
 

@@ -46,6 +46,7 @@ double growth(std::int64_t n) { return 2 / pi * std::log(2.0 * static_cast<doubl
 
 // Points, or heights, side by side, whatever vectors the processor has.
 constexpr std::size_t group = 8;
+constexpr auto step = static_cast<std::int64_t>(group);
 typedef double Eight __attribute__((vector_size(group * sizeof(double)), aligned(8), may_alias));
 const Eight& eight_at(const double* p) { return *reinterpret_cast<const Eight*>(p); }
 Eight& eight_at(double* p) { return *reinterpret_cast<Eight*>(p); }
@@ -53,9 +54,9 @@ Eight& eight_at(double* p) { return *reinterpret_cast<Eight*>(p); }
 // waves[l][i] = cos(l x[i]) for l < n, turned on from one l to the next.
 VDVR_WIDE void turn_on(const double* cosine, const double* sine, std::int64_t n, double* waves) {
   const Eight c = eight_at(cosine), s = eight_at(sine);
-  Eight re = c - c + 1, im = s - s;
+  Eight re = Eight{} + 1.0, im{};
   for (std::int64_t l = 0; l < n; ++l) {
-    eight_at(waves + l * static_cast<std::int64_t>(group)) = re;
+    eight_at(waves + l * step) = re;
     const Eight next = re * c - im * s;
     im = im * c + re * s;
     re = next;
@@ -66,7 +67,6 @@ VDVR_WIDE void turn_on(const double* cosine, const double* sine, std::int64_t n,
 // additions: four columns' take turns.
 VDVR_WIDE void sum_columns(const double* a, std::int64_t columns, std::int64_t rows, const double* waves,
                            double* sums) {
-  constexpr auto step = static_cast<std::int64_t>(group);
   std::int64_t m = 0;
   for (; m + 4 <= columns; m += 4) {
     Eight s0{}, s1{}, s2{}, s3{};
@@ -93,8 +93,7 @@ VDVR_WIDE void sum_columns(const double* a, std::int64_t columns, std::int64_t r
 // sum over m of lines[m][i] waves[m][i].
 VDVR_WIDE void sum_lines(const double* lines, const double* waves, std::int64_t n, double* out) {
   Eight sum{};
-  for (std::int64_t i = 0; i < n * static_cast<std::int64_t>(group); i += static_cast<std::int64_t>(group))
-    sum += eight_at(lines + i) * eight_at(waves + i);
+  for (std::int64_t m = 0; m < n; ++m) sum += eight_at(lines + m * step) * eight_at(waves + m * step);
   eight_at(out) = sum;
 }
 
