@@ -17,7 +17,11 @@ namespace vdvr {
 namespace {
 
 constexpr std::int64_t layers = 6, timed_blocks = 3;
-constexpr double sampled_bricks = 480, fewest_of_stratum = 12;
+// How many bricks a forecast looks at, and of a stratum at least: a few by the way.
+struct SampleSize {
+  double all = 480, of_stratum = 12;
+};
+constexpr SampleSize a_few{120, 3};
 // Of a large grid: columns of blocks to look at, samples times views that may be back-projected for them, and
 // kept nodes around a block.
 constexpr double fewest_columns = 4, most_back_projected = 3e9, kept_around = 40;
@@ -140,7 +144,8 @@ class Paces {
 // The strata of the bricks, and which of them to look at.
 std::map<int, Stratum> strata_of(const std::vector<std::uint8_t>& near,
                                  const std::vector<std::uint8_t>& looked_at, const std::vector<double>& error,
-                                 const NodeTolerance& tolerance, const Index3& n, bool all_layers) {
+                                 const NodeTolerance& tolerance, const Index3& n, bool all_layers,
+                                 const SampleSize& size) {
   const std::int64_t some = all_layers ? n[2] : std::min(layers, n[2]);
   std::vector<std::uint8_t> in_layer(at(n[2]), 0);
   for (std::int64_t i = 0; i < some; ++i) in_layer[at((2 * i + 1) * n[2] / (2 * some))] = 1;
@@ -162,7 +167,7 @@ std::map<int, Stratum> strata_of(const std::vector<std::uint8_t>& near,
   std::mt19937 random(1);
   for (auto& [key, s] : strata) {
     std::shuffle(s.candidates.begin(), s.candidates.end(), random);
-    const double wanted = std::max(fewest_of_stratum, sampled_bricks * weight(key, s) / all_weights);
+    const double wanted = std::max(size.of_stratum, size.all * weight(key, s) / all_weights);
     s.candidates.resize(std::min(s.candidates.size(), static_cast<std::size_t>(wanted)));
     // Bricks that err more, for what they may, lie together, as those that are refined do.
     std::stable_sort(s.bricks.begin(), s.bricks.end(),
@@ -362,11 +367,11 @@ struct Forecaster::Fates {
   std::array<std::vector<std::uint8_t>, fates> bricks;
 };
 
-Forecaster::Fates Forecaster::foresee(const NodeTolerance& tolerance) {
+Forecaster::Fates Forecaster::foresee(const NodeTolerance& tolerance, bool by_the_way) {
   const GoldSettings& settings = gold_.fine().settings();
   const Index3 n = Bricks(settings.grid, settings.granularity).along();
-  std::map<int, Stratum> strata =
-      strata_of(near_, looked_at_, error_, tolerance, n, settings.part.has_value());
+  std::map<int, Stratum> strata = strata_of(near_, looked_at_, error_, tolerance, n,
+                                            settings.part.has_value(), by_the_way ? a_few : SampleSize{});
   std::vector<std::uint8_t> sampled(near_.size(), 0);
   for (const auto& [key, s] : strata)
     for (const std::int64_t i : s.candidates) sampled[at(i)] = 1;
@@ -405,15 +410,15 @@ double Forecaster::ratio_of(const Fates& foreseen) const {
          static_cast<double>(base_samples_);
 }
 
-double Forecaster::samples_ratio(const NodeTolerance& tolerance) {
-  return ratio_of(foresee(in_own_units(tolerance)));
+double Forecaster::samples_ratio(const NodeTolerance& tolerance, bool by_the_way) {
+  return ratio_of(foresee(in_own_units(tolerance), by_the_way));
 }
 
 BuildForecast Forecaster::forecast(const NodeTolerance& wanted) {
   const NodeTolerance tolerance = in_own_units(wanted);
   const double first_pass = first_pass_seconds(tolerance);
   Paces small(gold_);
-  Fates foreseen = foresee(tolerance);
+  Fates foreseen = foresee(tolerance, false);
   auto& bricks = foreseen.bricks;
   tile_pace_ = small.pace(gold_.fine(), GoldStream::For::samples);
   measure_pace_ = small.pace(gold_.fine(), GoldStream::For::measuring);

@@ -4,9 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "host/base/system/casts.hpp"
 #include "host/certify/forecaster.hpp"
@@ -76,23 +76,32 @@ BrickSigma sigma_of_plan(Device& device, const ProjectionSet& scan, const Plan& 
       scan, plan.field, plan.grid, granularity);
 }
 
-std::vector<SigmaForecast> forecast_in_sigma(const Plan& plan, const BrickSigma& sigma,
-                                             std::span<const double> multiples) {
+namespace {
+
+// None where the plan looked at too little for it.
+std::optional<SigmaForecast> forecast_of(const Plan& plan, const BrickSigma& sigma, double multiple,
+                                         bool by_the_way) {
   // Of parallel beam an estimate is one of rows, or bounded by some views.
   const bool of_cone = plan.prepared && !plan.prepared->filtered.views.empty();
-  if (!plan.forecaster || (plan.estimated && !of_cone)) return {};
-  std::vector<SigmaForecast> out;
-  for (const double multiple : multiples) {
-    NodeTolerance tolerance(0, sigma.of_brick);
-    for (float& brick : tolerance.by_brick) {
-      const double wanted =
-          asked_of_brick(multiple, static_cast<double>(brick)) - plan.budget.arithmetic.value;
-      // Below what rounding takes no tolerance is within reach: such a brick counts with the plan's.
-      brick = static_cast<float>(wanted > 0 ? wanted : plan.epsilon_abs);
-      tolerance.of_all = std::max(tolerance.of_all, static_cast<double>(brick));
-    }
-    if (tolerance.of_all > 0) out.push_back({multiple, plan.forecaster->samples_ratio(tolerance)});
+  if (!plan.forecaster || (plan.estimated && !of_cone)) return std::nullopt;
+  NodeTolerance tolerance(0, sigma.of_brick);
+  for (float& brick : tolerance.by_brick) {
+    const double wanted = asked_of_brick(multiple, static_cast<double>(brick)) - plan.budget.arithmetic.value;
+    // Below what rounding takes no tolerance is within reach: such a brick counts with the plan's.
+    brick = static_cast<float>(wanted > 0 ? wanted : plan.epsilon_abs);
+    tolerance.of_all = std::max(tolerance.of_all, static_cast<double>(brick));
   }
+  if (!(tolerance.of_all > 0)) return std::nullopt;
+  return SigmaForecast{multiple, plan.forecaster->samples_ratio(tolerance, by_the_way)};
+}
+
+}  // namespace
+
+std::vector<SigmaForecast> forecast_in_sigma(const Plan& plan, const BrickSigma& sigma,
+                                             std::span<const double> multiples) {
+  std::vector<SigmaForecast> out;
+  for (const double multiple : multiples)
+    if (const auto forecast = forecast_of(plan, sigma, multiple, true)) out.push_back(*forecast);
   return out;
 }
 
@@ -114,8 +123,8 @@ PlanInSigma make_plan_in_sigma(Device& device, const ProjectionSet& scan, double
   whole.plan.by_brick = refinement_in_sigma(out.sigma, multiple).by_brick;
   out.plan = make_plan(device, scan, Tolerance{{}, asked_of_brick(multiple, out.sigma.range.least)}, whole,
                        progress);
-  if (const auto forecast = forecast_in_sigma(out.plan, out.sigma, std::array{multiple}); !forecast.empty())
-    out.plan.samples_ratio = forecast.front().samples_ratio;
+  if (const auto forecast = forecast_of(out.plan, out.sigma, multiple, false))
+    out.plan.samples_ratio = forecast->samples_ratio;
   return out;
 }
 

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "host/base/opencl/host_fft.hpp"
+#include "host/base/system/wide.hpp"
 
 namespace vdvr {
 namespace {
@@ -46,6 +47,21 @@ double rounding(const NodeFunctional& f, double magnitude) {
   return 8 * static_cast<double>(f.taps.size() + highest + 4) * 0x1p-53 * magnitude;
 }
 
+// Adds terms[i][m] times the wave at place i, which turns on from place to place.
+VDVR_WIDE void add_terms(const double* terms, std::size_t places, std::size_t count, Complex wave,
+                         Complex turn, double* real, double* imag) {
+  double re = wave.real(), im = wave.imag();
+  for (std::size_t i = 0; i < places; ++i, terms += count) {
+    for (std::size_t m = 0; m < count; ++m) {
+      real[m] += terms[m] * re;
+      imag[m] += terms[m] * im;
+    }
+    const double next = re * turn.real() - im * turn.imag();
+    im = re * turn.imag() + im * turn.real();
+    re = next;
+  }
+}
+
 // e and its derivatives up to the `count`-th, exclusive, at one frequency after another.
 class Symbol {
  public:
@@ -62,18 +78,8 @@ class Symbol {
   void at(double kappa, std::vector<Complex>& derivative) {
     std::ranges::fill(real_, 0.0);
     std::ranges::fill(imag_, 0.0);
-    const Complex turn = std::polar(1.0, kappa);
-    double re = std::cos(kappa * f_.first), im = std::sin(kappa * f_.first);
-    for (std::size_t i = 0; i < f_.taps.size(); ++i) {
-      const double* const term = terms_.data() + i * count_;
-      for (std::size_t m = 0; m < count_; ++m) {
-        real_[m] += term[m] * re;
-        imag_[m] += term[m] * im;
-      }
-      const double next = re * turn.real() - im * turn.imag();
-      im = re * turn.imag() + im * turn.real();
-      re = next;
-    }
+    add_terms(terms_.data(), f_.taps.size(), count_, std::polar(1.0, kappa * f_.first),
+              std::polar(1.0, kappa), real_.data(), imag_.data());
     for (std::size_t m = 0; m < count_; ++m) derivative[m] = {real_[m], imag_[m]};
     for (std::size_t m = 0; m < count_ && static_cast<int>(m) <= f_.order; ++m) {
       const int left = f_.order - static_cast<int>(m);
@@ -117,10 +123,13 @@ std::vector<UpToHighest> largest_derivatives(const NodeFunctional& f, double fro
 // The cut falls from 1 to 0 as 1 - t^6 (1 + 6 (1 - t) + .. + 252 (1 - t)^5), whose derivative is -2772 (t (1
 // - t))^5: five derivatives are continuous.
 double cut(double t) {
+  if (t <= 0) return 1;
+  if (t >= 1) return 0;
   constexpr std::array binomial{252.0, 126.0, 56.0, 21.0, 6.0, 1.0};
   double sum = 0;
   for (const double b : binomial) sum = sum * (1 - t) + b;
-  return t <= 0 ? 1 : t >= 1 ? 0 : 1 - std::pow(t, 6) * sum;
+  const double third = t * t * t;
+  return 1 - third * third * sum;
 }
 
 // At least its m-th derivatives, m <= 6: with x = 2 t - 1, 2772 / 1024 (1 - x^2)^5 differentiated m - 1
@@ -161,13 +170,19 @@ double tail(const UpToHighest& inside, const UpToHighest& falling, double band, 
 }
 
 // sum |a_j| of every moment: of the coefficients by FFT, what is beyond them, and what is beyond them folded
-// onto them.
+// onto them. The a_j are real, since e(-kappa) = e(kappa)*: of two moments they are the real and the
+// imaginary part of one FFT, each moment divided by the power of two below its magnitude.
 std::vector<double> coefficient_sums(const NodeFunctional& f, const std::vector<UpToHighest>& inside,
                                      double band, double end) {
   static const fft::HostFft transform(series_samples);
   constexpr std::size_t half = series_samples / 2;
   const std::size_t moments = inside.size();
-  std::vector<std::vector<Complex>> g(moments, std::vector<Complex>(series_samples));
+  std::vector<double> magnitudes, scale;
+  for (std::size_t n = 0; n < moments; ++n) {
+    magnitudes.push_back(magnitude(f, n, end));
+    scale.push_back(magnitudes[n] > 0 ? std::exp2(-std::ilogb(magnitudes[n])) : 1);
+  }
+  std::vector<std::vector<Complex>> pairs((moments + 1) / 2, std::vector<Complex>(series_samples));
   std::vector<Complex> at(moments);
   Symbol symbol(f, moments);
   for (std::size_t s = 0; s <= half; ++s) {
@@ -175,22 +190,30 @@ std::vector<double> coefficient_sums(const NodeFunctional& f, const std::vector<
     const double factor = cut((kappa - band) / (end - band));
     if (!(factor > 0)) continue;  // the last is half: it is 0
     symbol.at(kappa, at);
-    for (std::size_t n = 0; n < moments; ++n) {
-      g[n][s] = at[n] * factor;
-      if (s > 0) g[n][series_samples - s] = std::conj(g[n][s]);
+    for (std::size_t n = 0; n < moments; ++n) at[n] *= factor * scale[n];
+    for (std::size_t n = 0; n < moments; n += 2) {
+      const Complex a = at[n], b = n + 1 < moments ? at[n + 1] : Complex{};
+      pairs[n / 2][s] = {a.real() - b.imag(), a.imag() + b.real()};                              // a + i b
+      if (s > 0) pairs[n / 2][series_samples - s] = {a.real() + b.imag(), b.real() - a.imag()};  // a* + i b*
     }
   }
   const std::vector<UpToHighest> falling = largest_derivatives(f, band, end, 64, moments);
-  std::vector<double> out(moments);
-  for (std::size_t n = 0; n < moments; ++n) {
-    transform.forward(g[n]);
-    double sum = 0;
-    for (const Complex& a : g[n])
-      sum += std::abs(a.real()) / series_samples;  // real, since e(-kappa) = e(kappa)*
-    // Errors of the samples and of the FFT, in the 2-norm: sum |a_j| <= sqrt(samples) times the norm of all
-    // a_j.
-    const double noise = std::sqrt(double{series_samples}) * 8 * rounding(f, magnitude(f, n, end));
-    out[n] = sum + 2 * tail(inside[n], falling[n], band, end) + noise;
+  std::vector<double> out;
+  for (std::vector<Complex>& pair : pairs) {
+    transform.forward(pair);
+    std::array<double, 2> sums{};
+    for (const Complex& a : pair) {
+      sums[0] += std::abs(a.real());
+      sums[1] += std::abs(a.imag());
+    }
+    for (std::size_t i = 0; i < 2 && out.size() < moments; ++i) {
+      const std::size_t n = out.size();
+      // Errors of the samples and of the FFT, in the 2-norm: sum |a_j| <= sqrt(samples) times the norm of all
+      // a_j. The other moment of the pair is at most twice as large.
+      const double noise = std::sqrt(double{series_samples}) * 8 * rounding(f, magnitudes[n]);
+      out.push_back(sums[i] / (scale[n] * series_samples) + 2 * tail(inside[n], falling[n], band, end) +
+                    noise);
+    }
   }
   return out;
 }

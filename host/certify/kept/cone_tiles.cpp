@@ -163,6 +163,17 @@ void ConeTiles::look_at_views(const Coverage& coverage) {
     sup_ = std::max(sup_, seen.sum * (1 + 1e-12));
   }
   for (std::size_t axis = 0; axis < 3; ++axis) look_at_axis(axis, coverage);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::vector<double>& bands = bands_seen_[axis == 2 ? 1 : 0];  // x and y share theirs
+    std::array<bool, ProjectiveError::bands> seen{};
+    for (const double band : bands) seen[ProjectiveError::place_of(band, highest(axis))] = true;
+    for (const auto& part : at_parts_[axis])
+      for (const ViewAtPart& view : part)
+        if (bool& known = seen[ProjectiveError::place_of(view.band, highest(axis))]; !known) {
+          known = true;
+          bands.push_back(view.band);
+        }
+  }
   columns_ = upsampled_columns(g.columns, density, std::ceil(beyond_u) + 1);
   rows_ = upsampled_columns(g.rows, density, std::ceil(beyond_v) + 1);
 }
@@ -380,21 +391,11 @@ ConeTiles::Errors ConeTiles::errors(std::int64_t together, Fp64 fp64, Interpolat
   return out;
 }
 
-// x and y share theirs.
-std::vector<double> ConeTiles::bands_seen(std::size_t axis) const {
-  std::vector<double> out;
-  for (std::size_t a = 0; a < 3; ++a)
-    if ((a == 2) == (axis == 2))
-      for (const auto& part : at_parts_[a])
-        for (const ViewAtPart& view : part) out.push_back(view.band);
-  return out;
-}
-
 // By its weights: the best filter is asked for again by those who keep it.
 ConeTiles::Known& ConeTiles::known(std::size_t axis, const GoldFilter& filter) {
   const std::tuple key{axis == 2, filter.rate, filter.weights};
   if (const auto found = filters_.find(key); found != filters_.end()) return found->second;
-  Known now{{filter, highest(axis), bands_seen(axis), most_moments}, {}};
+  Known now{{filter, highest(axis), bands_seen_[axis == 2 ? 1 : 0], most_moments}, {}};
   return filters_.emplace(key, std::move(now)).first->second;
 }
 
@@ -405,18 +406,29 @@ double ConeTiles::largest(std::size_t axis, const GoldFilter& filter) {
   return *found;
 }
 
-// At least the largest sum over the views of what a filter errs along an axis. Errors grow with bands and
-// with how lambda does: bounds at a part's largest of both hold for all of its views, and most parts lie
-// below the largest sum by that.
+// At least the sum over a part's views: those whose bands have the same constants by the largest band and
+// growth among them.
+double ConeTiles::most_of(const std::vector<ViewAtPart>& part, std::size_t axis,
+                          const ProjectiveError& error) const {
+  std::array<ViewAtPart, ProjectiveError::bands> alike{};
+  for (const ViewAtPart& view : part) {
+    ViewAtPart& most = alike[ProjectiveError::place_of(view.band, highest(axis))];
+    most = {most.weight + view.weight, std::max(most.band, view.band),
+            std::max(most.rho, std::abs(view.rho))};
+  }
+  double sum = 0;
+  for (const ViewAtPart& most : alike)
+    if (most.weight > 0) sum += most.weight * error.at(most.band, most.rho);
+  return sum * (1 + 1e-12);
+}
+
+// At least the largest sum over the views of what a filter errs along an axis. Most parts lie below it by
+// their bounds.
 double ConeTiles::largest(std::size_t axis, const ProjectiveError& error) const {
   const auto& parts = at_parts_[axis];
   std::vector<std::pair<double, std::size_t>> order(parts.size());
   parallel_for(std::ssize(parts), {}, "", [&](std::int64_t i) {
-    ViewAtPart most{};
-    for (const ViewAtPart& view : parts[at(i)])
-      most = {most.weight + view.weight, std::max(most.band, view.band),
-              std::max(most.rho, std::abs(view.rho))};
-    order[at(i)] = {most.weight * error.at(most.band, most.rho) * (1 + 1e-12), at(i)};
+    order[at(i)] = {most_of(parts[at(i)], axis, error), at(i)};
   });
   std::ranges::sort(order, std::greater<>{});
   double largest = 0;
@@ -433,26 +445,31 @@ double ConeTiles::largest(std::size_t axis, const ProjectiveError& error) const 
   return largest * (1 + 1e-12);
 }
 
-// What proposals are ordered by: about the least that it can be, of the first parts as if no view grew.
-double ConeTiles::least_of(std::size_t axis, const ProjectiveError& error) const {
+// At most what a filter errs along an axis: of some parts, as if no view grew and none saw less than
+// `fewest` radians a node.
+double ConeTiles::least_of(std::size_t axis, const ProjectiveError& error, double fewest) const {
   constexpr std::size_t some = 8;
   double largest = 0;
   for (const auto& part : at_parts_[axis] | std::views::take(some)) {
     double sum = 0;
-    for (const ViewAtPart& view : part) sum += view.weight * error.at(view.band, 0);
+    for (const ViewAtPart& view : part)
+      if (view.band >= fewest) sum += view.weight * error.at(view.band, 0);
     largest = std::max(largest, sum);
   }
   return largest;
 }
 
-ConeTiles::BestFilter ConeTiles::best_filter(int phases, std::size_t axis, int taps) {
+// Designed for the band with which it errs least, most views being below the highest.
+ConeTiles::BestFilter ConeTiles::best_filter(int phases, std::size_t axis, int taps, double most) {
   BestFilter best{std::nullopt, HUGE_VAL};
   if (highest(axis) > highest_gold_band) return best;
   if (phases == 1) return {design_gold_filter(1, highest(axis), taps), 0};
+  const std::tuple key{axis == 2, phases, taps};
+  if (const auto found = best_.find(key); found != best_.end()) return found->second;
   const auto along = [&](const auto& of_axis) {
     return axis == 2 ? of_axis(2) : std::max(of_axis(0), of_axis(1));
   };
-  // What they err at least, as of views that do not grow, orders them: it takes a tenth of the whole.
+  // What they err at least orders them: it takes a twentieth of the whole, which few then need.
   struct Proposal {
     double least = 0;
     std::size_t number = 0;
@@ -463,20 +480,26 @@ ConeTiles::BestFilter ConeTiles::best_filter(int phases, std::size_t axis, int t
   };
   constexpr std::array shares{0.8, 0.85, 0.9, 0.95, 1.0};
   std::vector<Proposal> proposals(shares.size());
-  const std::vector<double> bands = bands_seen(axis);
+  // What is lower errs little.
+  const double fewest = 0.7 * highest(axis);
+  std::vector<double> bands = bands_seen_[axis == 2 ? 1 : 0];
+  std::erase_if(bands, [&](double band) {
+    return ProjectiveError::place_of(band, highest(axis)) < ProjectiveError::place_of(fewest, highest(axis));
+  });
   parallel_for(std::ssize(shares), {}, "", [&](std::int64_t i) {
     GoldFilter filter = design_gold_filter(phases, shares[at(i)] * highest(axis), taps);
     const ProjectiveError of_parallel(filter, highest(axis), bands, 1);
-    const double least = along([&](std::size_t a) { return least_of(a, of_parallel); });
+    const double least = along([&](std::size_t a) { return least_of(a, of_parallel, fewest); });
     proposals[at(i)] = {least, at(i), std::move(filter)};
   });
   std::ranges::sort(proposals, std::less<>{});
   for (Proposal& proposal : proposals) {
-    if (proposal.least > best.error) break;
+    if (proposal.least > std::min(best.error, most)) break;
     const double errs = along([&](std::size_t a) { return largest(a, proposal.filter); });
     if (!(errs < best.error)) continue;
     best = {std::move(proposal.filter), errs};
   }
+  if (best.error <= most) best_.emplace(key, best);  // others may err less that were not looked at
   return best;
 }
 

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -91,7 +92,8 @@ class ConeTiles {
     std::optional<GoldFilter> filter;
     double error = 0;  ///< at least |filtered - F| where exact nodes are filtered along the axis
   };
-  [[nodiscard]] BestFilter best_filter(int phases, std::size_t axis, int taps);
+  /// The best of all where it errs by at most `most`; else one that errs more, or none.
+  [[nodiscard]] BestFilter best_filter(int phases, std::size_t axis, int taps, double most = HUGE_VAL);
   /// At least |filtered - F| where exact nodes are filtered along z, then y, then x.
   [[nodiscard]] double filter_error(const GoldFilter& x, const GoldFilter& y, const GoldFilter& z);
 
@@ -118,10 +120,11 @@ class ConeTiles {
     return std::max(least, axis == 2 ? band_[2] : std::max(band_[0], band_[1]));
   }
   [[nodiscard]] double largest(std::size_t axis, const ProjectiveError& error) const;
-  [[nodiscard]] double least_of(std::size_t axis, const ProjectiveError& error) const;
+  [[nodiscard]] double most_of(const std::vector<ViewAtPart>& part, std::size_t axis,
+                               const ProjectiveError& error) const;
+  [[nodiscard]] double least_of(std::size_t axis, const ProjectiveError& error, double fewest) const;
   /// The same of a filter, found once.
   double largest(std::size_t axis, const GoldFilter& filter);
-  [[nodiscard]] std::vector<double> bands_seen(std::size_t axis) const;
   // What is known of a filter: by axis the largest sum over the views of what it errs.
   struct Known {
     ProjectiveError error;
@@ -144,7 +147,9 @@ class ConeTiles {
   double row_step_ = 0;     // rows of the table from a node to the one above it
   double block_reach_ = 0;  // columns or rows of the table from a block's middle to its nodes
   std::array<std::vector<std::vector<ViewAtPart>>, 3> at_parts_;        // where filters along the axis fill
+  std::array<std::vector<double>, 2> bands_seen_;                       // one of each place; x and y share
   std::map<std::tuple<bool, int, std::vector<float>>, Known> filters_;  // along z, rate, weights
+  std::map<std::tuple<bool, int, int>, BestFilter> best_;               // along z, phases, taps
 };
 
 }  // namespace vdvr

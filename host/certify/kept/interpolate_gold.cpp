@@ -32,9 +32,9 @@ int lanes_along_z(opencl::State& state) {
   return tuned == 16 && state.device.getInfo<CL_DEVICE_NATIVE_VECTOR_WIDTH_FLOAT>() <= 8 ? 8 : tuned;
 }
 
-// Whole groups of the phases that a work-item makes together.
+// Whole groups of the phases that a work-item makes together, SUMS of interpolate.cl.
 std::vector<float> padded(int phases, int taps, std::span<const float> weights) {
-  const std::int64_t together = phases == 2 ? 1 : 3, wanted = phases - 1;
+  const std::int64_t together = VDVR_PHASES_TOGETHER(phases), wanted = phases - 1;
   std::vector<float> out(at(std::max<std::int64_t>(1, (wanted + together - 1) / together * together) * taps),
                          0.0f);
   std::copy(weights.begin(), weights.end(), out.begin());
@@ -109,12 +109,16 @@ Across::Across(opencl::State& state, int phases, int taps, std::span<const float
 void Across::operator()(opencl::State& state, const opencl::DeviceArray<float>& in,
                         const opencl::DeviceArray<float>& out, const VdvrAcross& shape) const {
   const int lanes = column_tuning(state.info).lanes;
+  // Intervals side by side read nearly the same nodes: one after another where a box does not stay in the
+  // second cache meanwhile.
+  constexpr std::uint64_t cache = std::uint64_t{512} << 10;
+  const bool is_large = 4 * count(shape.z) * count(shape.others) * count(shape.intervals) > cache;
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrAcross> kernel(
       state, "certify/kept/interpolate", "across", defines(lanes, phases_, taps_));
   kernel(opencl::in_groups(state.info,
                            {count(shape.z / lanes), count(shape.others),
                             count(std::int64_t{shape.intervals} * shape.boxes)},
-                           {1, 4, 4}),
+                           {1, is_large ? 1U : 4U, is_large ? 16U : 4U}),
          out.buffer(), in.buffer(), weights_.buffer(), shape);
 }
 

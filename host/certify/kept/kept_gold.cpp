@@ -88,8 +88,8 @@ void KeptGold::keep_heights(double reach) {
     cone_.emplace(state_, scan_, upsampler_, sups_, coverage_, lattice);
     dense = true;
     for (const std::size_t a : {std::size_t{0}, std::size_t{2}}) {
-      const double allowed = half_taps_[a] < most ? enough : most_error;
-      if (cone_->best_filter(2, a, to_int(2 * half_taps_[a])).error <= allowed * cone_->sup()) continue;
+      const double allowed = (half_taps_[a] < most ? enough : most_error) * cone_->sup();
+      if (cone_->best_filter(2, a, to_int(2 * half_taps_[a]), allowed).error <= allowed) continue;
       dense = false;
       improve(a);
     }
@@ -115,14 +115,14 @@ Vec3 KeptGold::claimed() const {
 double KeptGold::room_to_sources(double from, const std::pair<double, double>& heights) const {
   const double half_tile = 0.5 * static_cast<double>(side) * std::hypot(spacing_[0], spacing_[1]);
   double room = HUGE_VAL;
-  for (const Corners& part : RegionOutline(coverage_, from).parts(heights))
-    for (std::size_t k = 0; k < scan_.views.size(); ++k)
-      for (const Vec3& corner : part) {
-        const ViewMatrix& m = scan_.views[k];
-        const double lambda = projected(m, corner)[2];
-        if (!(lambda > 0)) throw source_too_close(k);
-        room = std::min(room, 0.75 * lambda / std::hypot(m[2][0], m[2][1]) - half_tile);
-      }
+  const Corners all = RegionOutline(coverage_, from).whole(heights);
+  for (std::size_t k = 0; k < scan_.views.size(); ++k)
+    for (const Vec3& corner : all) {  // lambda is affine
+      const ViewMatrix& m = scan_.views[k];
+      const double lambda = projected(m, corner)[2];
+      if (!(lambda > 0)) throw source_too_close(k);
+      room = std::min(room, 0.75 * lambda / std::hypot(m[2][0], m[2][1]) - half_tile);
+    }
   return room;
 }
 

@@ -3,7 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <map>
+#include <mutex>
 #include <span>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "host/base/system/parallel.hpp"
@@ -11,8 +15,7 @@
 namespace vdvr {
 namespace {
 
-// Bands for which constants are known, evenly spaced. Beyond so many moments, magnitudes.
-constexpr std::size_t bands = 24, moments = most_moments;
+constexpr std::size_t bands = ProjectiveError::bands;
 
 std::vector<double> all_bands(double highest) {
   std::vector<double> out;
@@ -21,10 +24,27 @@ std::vector<double> all_bands(double highest) {
   return out;
 }
 
+// Filters of several rates have phases in common, and a plan's are those of the build: the last few are
+// remembered.
+std::vector<double> known_constants(const NodeFunctional& phase, double band, std::size_t moments) {
+  constexpr std::size_t most = 4096;
+  static std::mutex mutex;
+  static std::map<std::tuple<std::vector<double>, double, double, std::size_t>, std::vector<double>> known;
+  const std::tuple key{phase.taps, phase.first, band, moments};
+  {
+    const std::scoped_lock lock(mutex);
+    if (const auto found = known.find(key); found != known.end()) return found->second;
+  }
+  std::vector<double> made = moment_sup_constants(phase, band, moments);
+  const std::scoped_lock lock(mutex);
+  if (known.size() >= most) known.clear();
+  return known.emplace(key, std::move(made)).first->second;
+}
+
 }  // namespace
 
 ProjectiveError::ProjectiveError(const GoldFilter& filter, double highest)
-    : ProjectiveError(filter, highest, all_bands(highest), moments) {}
+    : ProjectiveError(filter, highest, all_bands(highest), most_moments) {}
 
 ProjectiveError::ProjectiveError(const GoldFilter& filter, double highest, std::span<const double> for_bands,
                                  std::size_t of_moments)
@@ -33,7 +53,7 @@ ProjectiveError::ProjectiveError(const GoldFilter& filter, double highest, std::
   constants_.assign(bands, {});
   std::vector<std::size_t> places;
   for (const double band : for_bands)
-    if (const std::size_t place = place_of(band); constants_[place].empty()) {
+    if (const std::size_t place = place_of(band, highest); constants_[place].empty()) {
       constants_[place].assign(of_moments, 0.0);
       places.push_back(place);
     }
@@ -42,18 +62,17 @@ ProjectiveError::ProjectiveError(const GoldFilter& filter, double highest, std::
   std::vector<std::vector<double>> found(places.size() * phases);
   parallel_for(static_cast<std::int64_t>(found.size()), {}, "", [&](std::int64_t n) {
     const auto i = static_cast<std::size_t>(n);
-    found[i] =
-        moment_sup_constants(functional(filter, static_cast<int>(i % phases) + 1),
-                             highest * static_cast<double>(places[i / phases] + 1) / bands, of_moments);
+    found[i] = known_constants(functional(filter, static_cast<int>(i % phases) + 1),
+                               highest * static_cast<double>(places[i / phases] + 1) / bands, of_moments);
   });
   for (std::size_t i = 0; i < found.size(); ++i)
     std::ranges::transform(constants_[places[i / phases]], found[i], constants_[places[i / phases]].begin(),
                            [](double a, double b) { return std::max(a, b); });
 }
 
-std::size_t ProjectiveError::place_of(double band) const {
+std::size_t ProjectiveError::place_of(double band, double highest) {
   return static_cast<std::size_t>(
-      std::clamp(std::ceil(band / highest_ * bands - 1), 0.0, static_cast<double>(bands - 1)));
+      std::clamp(std::ceil(band / highest * bands - 1), 0.0, static_cast<double>(bands - 1)));
 }
 
 double ProjectiveError::at(double band, double rho) const {
@@ -65,7 +84,7 @@ double ProjectiveError::at(double band, double rho) const {
   // of the whole, where an error is 1e-7 at least.
   const double exponent = band * reach_ * growth / (1 - growth);
   const double all = norm_ * std::exp(exponent) / ((1 - growth) * (1 - growth)), negligible = 0x1p-44 * all;
-  const std::vector<double>& known = constants_[place_of(band)];
+  const std::vector<double>& known = constants_[place_of(band, highest_)];
   if (known.empty()) return HUGE_VAL;
   double less = norm_ - known[0];    // which may be more, as bounds are
   double of_m = 1, power_m = norm_;  // (|rho| band)^m / m!, and norm reach^2m

@@ -2,6 +2,7 @@
 // (docs/error-bounds.md, section 16).
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <vector>
 
@@ -17,10 +18,15 @@ namespace vdvr {
 /// and of each term the filter makes a sum over band-limited values, which sup_constant bounds.
 class ProjectiveError {
  public:
+  /// Bands for which constants are known, evenly spaced.
+  static constexpr std::size_t bands = 24;
+  /// Whose constants hold for `band`. At one place errors grow with bands and with |rho|.
+  [[nodiscard]] static std::size_t place_of(double band, double highest);
+
   /// Of bands up to `highest`. Cost: 24 bands of moment_sup_constants for each pair of phases.
   ProjectiveError(const GoldFilter& filter, double highest);
   /// The same, for some bands only: elsewhere the error is infinite. Beyond `moments` magnitudes are taken: 1
-  /// does for rho 0. Cost: as much less.
+  /// does for rho 0. Cost: as much less; none for phases that were asked for lately.
   ProjectiveError(const GoldFilter& filter, double highest, std::span<const double> for_bands,
                   std::size_t moments);
   /// At least |filtered - f| / (lambda^-2 sup |g|), at any phase. Infinite where `band` exceeds the highest
@@ -28,8 +34,6 @@ class ProjectiveError {
   [[nodiscard]] double at(double band, double rho) const;
 
  private:
-  [[nodiscard]] std::size_t place_of(double band) const;
-
   double highest_ = 0, reach_ = 0, norm_ = 0;
   std::vector<std::vector<double>> constants_;  // [band][moment]; none of a copy
 };

@@ -42,6 +42,13 @@ Corners RegionOutline::part(const Vec3& low, const Vec3& high) const {
   return out;
 }
 
+Corners RegionOutline::whole(const std::pair<double, double>& heights) const {
+  Corners out;
+  for (const auto& [x, y] : outline_)
+    for (const double z : {heights.first, heights.second}) out.push_back({x, y, z});
+  return out;
+}
+
 std::vector<Corners> RegionOutline::parts(const std::pair<double, double>& heights) const {
   double outer = 0;
   for (const auto& [x, y] : outline_) outer = std::max({outer, std::abs(x), std::abs(y)});

@@ -17,6 +17,8 @@ class RegionOutline {
 
   /// Corners of an upright prism that holds all of it in a box. None where none of it is there.
   [[nodiscard]] Corners part(const Vec3& low, const Vec3& high) const;
+  /// The same between two heights: all of it.
+  [[nodiscard]] Corners whole(const std::pair<double, double>& heights) const;
   /// Prisms that hold all of it between two heights: some 16 across, four along z.
   [[nodiscard]] std::vector<Corners> parts(const std::pair<double, double>& heights) const;
 

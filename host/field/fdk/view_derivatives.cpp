@@ -112,18 +112,22 @@ Corners box_corners(const Vec3& low, const Vec3& high) {
 // X_e being affine in u and v, where u and v are extreme.
 ViewBox view_box(const ViewMatrix& matrix, std::span<const Vec3> corners) {
   ViewBox box;
-  box.lambda_min = least_lambda(matrix, corners);
-  if (!(box.lambda_min > 0)) return box;
   Vec3 magnitude{};  // of the terms of each row
   std::array<double, 2> lowest{HUGE_VAL, HUGE_VAL}, highest_at{-HUGE_VAL, -HUGE_VAL};  // u and v
+  box.lambda_min = HUGE_VAL;
   for (const Vec3& x : corners) {
     const double lambda = row_at(matrix, 2, x, magnitude[2]);
+    if (!(lambda > 0)) return {lambda};
+    box.lambda_min = std::min(box.lambda_min, lambda);
     for (std::size_t i = 0; i < 2; ++i) {
       const double place = row_at(matrix, i, x, magnitude[i]) / lambda;
       lowest[i] = std::min(lowest[i], place);
       highest_at[i] = std::max(highest_at[i], place);
     }
   }
+  // lambda is affine: least at a corner.
+  box.lambda_min -= row_rounding * magnitude[2];
+  if (!(box.lambda_min > 0)) return {box.lambda_min};
   for (std::size_t i = 0; i < 2; ++i) {
     const double least = lowest[i], most = highest_at[i];
     const double largest = std::max(std::abs(least), std::abs(most));

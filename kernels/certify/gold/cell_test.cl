@@ -376,6 +376,7 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
 #endif
         add_errors(&here, low_v, high_v, gold, low_tested, end_tested);
       }
+      SOON(c + 2 * to_y);
       c += to_x;
       gold_before = gold;
       gold = gold_after;

@@ -44,6 +44,7 @@ __kernel SHARED_COLUMN void fourth_differences(__global float* out, __global con
       const VEC east2 = READ(c + 2 * to_x), before_east = READ(c + to_x - to_y),
                 after_east = READ(c + to_x + to_y), below_east = READ(c + to_x - 1),
                 above_east = READ(c + to_x + 1), along_east = ALONG(below_east, east, above_east);
+      SOON(c + 3 * to_y);
       const INT counts = margin[column + x] < s.lowest ? (INT)(0) : inside;
       TAKE(xx, FOURTH(west2, west, here, east, east2))
       TAKE(yy, FOURTH(READ(c - 2 * to_y), before, here, after, READ(c + 2 * to_y)))

@@ -61,13 +61,20 @@ __kernel void along_z(__global float* out, __global const float* in, __global co
 #ifndef VDVR_TAPS
 #error "VDVR_TAPS must be the taps of the filters across z"
 #endif
-// Outputs that share what they read.
-#if VDVR_PHASES == 2
+// Named sums, not arrays, as above.
+#define SUMS VDVR_PHASES_TOGETHER(VDVR_PHASES)
+#if SUMS == 1
 #define FOR_SUMS(M) M(0)
-#define SUMS 1
-#else
+#elif SUMS == 3
 #define FOR_SUMS(M) M(0) M(1) M(2)
-#define SUMS 3
+#elif SUMS == 4
+#define FOR_SUMS(M) M(0) M(1) M(2) M(3)
+#elif SUMS == 5
+#define FOR_SUMS(M) M(0) M(1) M(2) M(3) M(4)
+#elif SUMS == 7
+#define FOR_SUMS(M) M(0) M(1) M(2) M(3) M(4) M(5) M(6)
+#else
+#error "no list of so many sums"
 #endif
 #define BEGIN_SUM(i) VEC phase##i = (VEC)(0.0f);
 #define ADD_TAP(i) phase##i = fma((VEC)(w[(i)*VDVR_TAPS + t]), v, phase##i);
