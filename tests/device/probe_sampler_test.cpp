@@ -5,10 +5,53 @@
 #include <bit>
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
 
 #include "vdvr/raycast.hpp"
 
+#include "host/base/opencl/state.hpp"
+#include "host/base/system/cache_files.hpp"
+#include "host/volume/sampler/remembered_probe.hpp"
+#include "tests/support/temporary_folder.hpp"
+
 using namespace vdvr;
+
+namespace {
+
+// What these tests are about is measured.
+struct NothingRemembered {
+  NothingRemembered() { setenv("VDVR_CACHE", "off", 1); }
+};
+BOOST_TEST_GLOBAL_FIXTURE(NothingRemembered);
+
+bool same(const FilterProbe& a, const FilterProbe& b) {
+  return a.image3d == b.image3d && a.weight_error == b.weight_error && a.delta == b.delta &&
+         a.by_steps == b.by_steps && a.constant_error == b.constant_error;
+}
+
+bool same_filters(const SamplerProbe& a, const SamplerProbe& b) {
+  return same(a, b) && same(a.u16, b.u16) && same(a.u8, b.u8) && a.note == b.note;
+}
+
+// The only file that remembers a sampler.
+std::filesystem::path only_file(const std::filesystem::path& cache) {
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(cache / "vdvr/samplers"))
+    files.push_back(entry.path());
+  BOOST_REQUIRE(files.size() == 1);
+  return files.front();
+}
+
+std::string text_of(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+}  // namespace
 
 BOOST_AUTO_TEST_CASE(charged_delta_is_never_below_what_was_measured) {
   for (const auto& info : Device::list()) {
@@ -81,4 +124,52 @@ BOOST_AUTO_TEST_CASE(probe_is_measured_once_per_device) {
   BOOST_TEST(first.buffer_rate == second.buffer_rate);
   Device again(std::to_string(device.info().index));
   BOOST_TEST(probe_sampler(again).buffer_rate == first.buffer_rate);
+}
+
+BOOST_AUTO_TEST_CASE(what_is_remembered_is_what_was_measured_and_nothing_else_is_taken_for_it) {
+  const support::TemporaryFolder folder;
+  Device device;
+  opencl::State& state = device.state();
+  const SamplerProbe measured = probe_filters(device);
+  remember_filters(state, measured);  // VDVR_CACHE is off
+  BOOST_TEST(!std::filesystem::exists(folder.path() / "vdvr"));
+  setenv("XDG_CACHE_HOME", folder.path().c_str(), 1);
+  setenv("VDVR_CACHE", "", 1);
+  BOOST_TEST(!remembered_filters(state));
+  remember_filters(state, measured);
+  if (std::getenv("LD_PRELOAD") != nullptr) {  // as a GPU
+    BOOST_TEST(!std::filesystem::exists(folder.path() / "vdvr"));
+    return;
+  }
+  const auto known = remembered_filters(state);
+  BOOST_REQUIRE(known.has_value());
+  BOOST_TEST(same_filters(*known, measured));
+
+  const std::filesystem::path file = only_file(folder.path());
+  const std::string text = text_of(file);
+  const auto holds = [&](const std::string& bytes) {
+    std::ofstream(file) << bytes;
+    return remembered_filters(state).has_value();
+  };
+  // Cut anywhere, but for line feeds at the end; of another device; with a number less.
+  for (std::size_t size = 0; size < text.size(); size += 7) BOOST_TEST(!holds(text.substr(0, size)));
+  BOOST_TEST(!holds("x" + text));
+  std::string another = text;
+  another[text.find('\n') + 1] ^= 1;
+  BOOST_TEST(!holds(another));
+  std::string fewer = text;
+  const std::size_t note = text.find(measured.note), line = text.rfind(' ', note);
+  fewer.erase(line, note - 1 - line);
+  BOOST_TEST(!holds(fewer));
+  BOOST_TEST(holds(text));
+  setenv("OPENCL_LAYERS", "some.so", 1);
+  BOOST_TEST(!remembered_filters(state));
+  unsetenv("OPENCL_LAYERS");
+
+  SamplerProbe wrong = measured;
+  wrong.u8.delta = HUGE_VAL;
+  std::filesystem::remove(file);
+  remember_filters(state, wrong);
+  BOOST_TEST(!std::filesystem::exists(file));
+  setenv("VDVR_CACHE", "off", 1);
 }

@@ -66,12 +66,13 @@ class Findings {
   bool flushes_;
 };
 
-// All that an answer can depend on, and that we know of.
+}  // namespace
+
 std::string identity(const State& state) {
   const DeviceInfo& d = state.info;
   // Of the platform too: PoCL names its compiler there alone.
   const cl::Platform platform(state.device.getInfo<CL_DEVICE_PLATFORM>());
-  std::string text = "vdvr: a device that passed its test\n";
+  std::string text;
   for (const std::string& part :
        {d.platform, platform.getInfo<CL_PLATFORM_VERSION>(), d.name, d.vendor, d.version, d.driver,
         std::string(VDVR_VERSION), build_options(defines_for(state)),
@@ -80,8 +81,6 @@ std::string identity(const State& state) {
   for (const bool flag : {d.is_gpu, d.is_cpu, has_double(state), d.subnormals}) text += flag ? '1' : '0';
   return text + '\n';
 }
-
-}  // namespace
 
 DeviceTest ask_device(State& state) {
   const auto start = std::chrono::steady_clock::now();
@@ -137,7 +136,8 @@ DeviceTest ask_device(State& state) {
 }
 
 DeviceTest test_device(State& state) {
-  const std::string text = identity(state), name = "devices/" + sha256_of_text(text);
+  const std::string text = "vdvr: a device that passed its test\n" + identity(state),
+                    name = "devices/" + sha256_of_text(text);
   // The checks' names follow, so that a remembered device shows them.
   if (const auto known = read_cached(name); known && known->starts_with(text)) {
     DeviceTest test;

@@ -8,8 +8,12 @@
 
 namespace vdvr::opencl {
 
-/// Runs the test, or remembers that this device passed it: by platform, device, driver, version of the
-/// program and the text of the kernels, in a file of the cache folder (host/base/system/cache_files.hpp).
+/// All that a device's answers can depend on, and that we know of: platform, device, driver, version of the
+/// program and the text of the test's kernels, by lines.
+std::string identity(const State& state);
+
+/// Runs the test, or remembers that this device passed it: by its identity, in a file of the cache folder
+/// (host/base/system/cache_files.hpp).
 /// Only devices that pass are remembered. Throws as a launch does where the device cannot run it at all.
 DeviceTest test_device(State& state);
 

@@ -130,8 +130,10 @@ void ConeTiles::look_at_views(const Coverage& coverage) {
   std::vector<Seen> of_parts(parts.size());
   parallel_for(static_cast<std::int64_t>(parts.size()), {}, "", [&](std::int64_t i) {
     Seen& out = of_parts[at(i)];
+    std::vector<ViewBox> boxes(scan_.views.size());
+    view_boxes(scan_.views, parts[at(i)], boxes);
     for (std::size_t k = 0; k < scan_.views.size(); ++k) {
-      const ViewBox seen = view_box(scan_.views[k], parts[at(i)]);
+      const ViewBox& seen = boxes[k];
       if (!(seen.lambda_min > 0)) {
         out.too_close = k;
         return;
@@ -188,8 +190,10 @@ void ConeTiles::look_at_axis(std::size_t axis, const Coverage& coverage) {
       RegionOutline(coverage, lattice_.claimed - lattice_.less[axis]).parts(heights);
   at_parts_[axis].resize(parts.size());
   parallel_for(static_cast<std::int64_t>(parts.size()), {}, "", [&](std::int64_t i) {
+    std::vector<ViewBox> boxes(scan_.views.size());
+    view_boxes(scan_.views, parts[at(i)], boxes);
     for (std::size_t k = 0; k < scan_.views.size(); ++k) {
-      const ViewBox seen = view_box(scan_.views[k], parts[at(i)]);
+      const ViewBox& seen = boxes[k];
       const double of_v = scan_.geometry.rows > 1 ? seen.along_v[axis] : 0.0;
       at_parts_[axis][at(i)].push_back({sups_.by_view[k].value / (seen.lambda_min * seen.lambda_min),
                                         pi * spacing * (seen.along_u[axis] + of_v) / seen.lambda_min,

@@ -6,6 +6,8 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "host/base/system/wide.hpp"
+
 namespace vdvr {
 namespace {
 
@@ -107,31 +109,62 @@ Corners box_corners(const Vec3& low, const Vec3& high) {
   return corners;
 }
 
-// u and v are quotients of affine functions whose denominator, lambda, is positive on the piece: on a segment
-// they rise all along, or fall. So their extremes over the piece lie at corners, and the largest |X_e|,
-// X_e being affine in u and v, where u and v are extreme.
-ViewBox view_box(const ViewMatrix& matrix, std::span<const Vec3> corners) {
-  ViewBox box;
-  Vec3 magnitude{};  // of the terms of each row
-  std::array<double, 2> lowest{HUGE_VAL, HUGE_VAL}, highest_at{-HUGE_VAL, -HUGE_VAL};  // u and v
-  box.lambda_min = HUGE_VAL;
-  for (const Vec3& x : corners) {
-    const double lambda = row_at(matrix, 2, x, magnitude[2]);
-    if (!(lambda > 0)) return {lambda};
-    box.lambda_min = std::min(box.lambda_min, lambda);
+namespace {
+
+// What some views see of a piece: of u and v the lowest and the highest; of each row of the matrix, lambda's
+// too, the largest sum of magnitudes.
+constexpr std::size_t together = 8;
+using OfViews = std::array<double, together>;
+struct Seen {
+  std::array<OfViews, 2> low{}, high{};
+  std::array<OfViews, 3> magnitude{};
+  OfViews lambda{};  // the least
+};
+
+// row_at of all views, in its order. `matrix`: [row][column].
+using Matrices = std::array<std::array<OfViews, 4>, 3>;
+inline __attribute__((always_inline)) void rows_at(const std::array<OfViews, 4>& row, const Vec3& x,
+                                                   OfViews& sum, OfViews& magnitude) {
+  for (std::size_t k = 0; k < together; ++k) {
+    const double a = row[0][k] * x[0], b = row[1][k] * x[1], c = row[2][k] * x[2];
+    sum[k] = row[3][k] + a + b + c;
+    const double terms = std::abs(row[3][k]) + std::abs(a) + std::abs(b) + std::abs(c);
+    magnitude[k] = terms > magnitude[k] || terms != terms ? terms : magnitude[k];  // NaN stays
+  }
+}
+
+VDVR_WIDE void look(const Matrices& matrix, const Vec3* corners, std::size_t count, Seen& out) {
+  Seen s = out;
+  for (std::size_t c = 0; c < count; ++c) {
+    OfViews lambda, place;
+    rows_at(matrix[2], corners[c], lambda, s.magnitude[2]);
+    for (std::size_t k = 0; k < together; ++k)
+      s.lambda[k] = lambda[k] < s.lambda[k] ? lambda[k] : s.lambda[k];
     for (std::size_t i = 0; i < 2; ++i) {
-      const double place = row_at(matrix, i, x, magnitude[i]) / lambda;
-      lowest[i] = std::min(lowest[i], place);
-      highest_at[i] = std::max(highest_at[i], place);
+      rows_at(matrix[i], corners[c], place, s.magnitude[i]);
+      for (std::size_t k = 0; k < together; ++k) {
+        const double at = place[k] / lambda[k];
+        s.low[i][k] = at < s.low[i][k] ? at : s.low[i][k];
+        s.high[i][k] = s.high[i][k] < at ? at : s.high[i][k];
+      }
     }
   }
-  // lambda is affine: least at a corner.
-  box.lambda_min -= row_rounding * magnitude[2];
-  if (!(box.lambda_min > 0)) return {box.lambda_min};
+  out = s;
+}
+
+// u and v are quotients of affine functions whose denominator, lambda, is positive on the piece: on a segment
+// they rise all along, or fall. So their extremes over the piece lie at corners, and the largest |X_e|,
+// X_e being affine in u and v, where u and v are extreme. lambda is affine too.
+ViewBox box_of(const ViewMatrix& matrix, const Seen& seen, std::size_t k) {
+  ViewBox box;
+  // A corner that is no number is among the terms.
+  box.lambda_min = seen.lambda[k] - row_rounding * seen.magnitude[2][k];
+  if (!(box.lambda_min > 0)) return box;
   for (std::size_t i = 0; i < 2; ++i) {
-    const double least = lowest[i], most = highest_at[i];
+    const double least = seen.low[i][k], most = seen.high[i][k];
     const double largest = std::max(std::abs(least), std::abs(most));
-    const double error = row_rounding * (magnitude[i] + largest * magnitude[2]) / box.lambda_min;
+    const double error =
+        row_rounding * (seen.magnitude[i][k] + largest * seen.magnitude[2][k]) / box.lambda_min;
     for (std::size_t e = 0; e < 3; ++e) {
       const double l = matrix[2][e];
       const double x = std::max(std::abs(matrix[i][e] - l * least), std::abs(matrix[i][e] - l * most));
@@ -141,6 +174,32 @@ ViewBox view_box(const ViewMatrix& matrix, std::span<const Vec3> corners) {
     }
   }
   for (std::size_t e = 0; e < 3; ++e) box.growth[e] = std::abs(matrix[2][e]);
+  return box;
+}
+
+}  // namespace
+
+void view_boxes(std::span<const ViewMatrix> views, std::span<const Vec3> corners, std::span<ViewBox> out) {
+  for (std::size_t first = 0; first < views.size(); first += together) {
+    const std::size_t n = std::min(together, views.size() - first);
+    Matrices matrices;
+    for (std::size_t k = 0; k < together; ++k)
+      for (std::size_t row = 0; row < 3; ++row)
+        for (std::size_t e = 0; e < 4; ++e) matrices[row][e][k] = views[first + std::min(k, n - 1)][row][e];
+    Seen seen;
+    for (std::size_t i = 0; i < 2; ++i) {
+      seen.low[i].fill(HUGE_VAL);
+      seen.high[i].fill(-HUGE_VAL);
+    }
+    seen.lambda.fill(HUGE_VAL);
+    look(matrices, corners.data(), corners.size(), seen);
+    for (std::size_t k = 0; k < n; ++k) out[first + k] = box_of(views[first + k], seen, k);
+  }
+}
+
+ViewBox view_box(const ViewMatrix& matrix, std::span<const Vec3> corners) {
+  ViewBox box;
+  view_boxes({&matrix, 1}, corners, {&box, 1});
   return box;
 }
 
@@ -183,8 +242,10 @@ SixthSups sixth_sups(std::span<const ViewMatrix> views, std::span<const Detector
   if (views.size() != sups.size()) throw std::logic_error("sixth_sups: one set of sups for each view");
   SixthSups out;
   constexpr std::array<std::size_t, 3> step{4, 1, 0};  // to a place with one more square along an axis
+  std::vector<ViewBox> boxes(views.size());
+  view_boxes(views, corners, boxes);
   for (std::size_t k = 0; k < views.size(); ++k) {
-    const ViewBox box = view_box(views[k], corners);
+    const ViewBox& box = boxes[k];
     if (!(box.lambda_min > 0)) {
       out.sums_.fill(HUGE_VAL);
       return out;

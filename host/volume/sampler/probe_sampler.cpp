@@ -17,6 +17,7 @@
 #include "host/base/opencl/kernel.hpp"
 #include "host/base/system/parallel.hpp"
 #include "host/volume/sampler/corner_weights.hpp"
+#include "host/volume/sampler/remembered_probe.hpp"
 #include "vdvr/expert/probe_sampler.hpp"
 
 namespace vdvr {
@@ -406,13 +407,20 @@ void measure_rates(opencl::State& state, SamplerProbe& p) {
   if (p.image3d_rate > p.buffer_rate && std::isfinite(p.weight_error)) p.chosen = "image3d";
 }
 
+SamplerProbe filters_of(opencl::State& state) {
+  if (auto known = remembered_filters(state)) return *std::move(known);
+  SamplerProbe measured = measure_filters(state);
+  remember_filters(state, measured);
+  return measured;
+}
+
 // By device, for the process' life: the answer belongs to the hardware and its driver, not to a context.
 SamplerProbe known_probe(opencl::State& state, bool rates) {
   static std::mutex mutex;
   static std::map<cl_device_id, SamplerProbe> known;
   const std::lock_guard lock(mutex);
   auto found = known.find(state.device());
-  if (found == known.end()) found = known.emplace(state.device(), measure_filters(state)).first;
+  if (found == known.end()) found = known.emplace(state.device(), filters_of(state)).first;
   if (rates && found->second.chosen.empty()) measure_rates(state, found->second);
   return found->second;
 }

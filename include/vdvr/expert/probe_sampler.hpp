@@ -57,7 +57,8 @@ struct SamplerProbe : FilterProbe {
   std::string chosen;                        ///< "buffer" or "image3d": what `auto` takes, by those rates
   std::string note;  ///< the class that delta was charged for, or why there is no image3d sampler
 };
-/// Measured once per device and process (about a second, most of it for the rates), then remembered.
+/// Measured once per device and process (about a second, most of it for the rates). What certificates charge
+/// is remembered in the cache folder, as the device's own test is (docs/robustness.md); rates are not.
 VDVR_API SamplerProbe probe_sampler(Device& device);
 /// What certificates charge. `chosen` is empty and rates are 0 unless they are known already.
 VDVR_API SamplerProbe probe_filters(Device& device);
