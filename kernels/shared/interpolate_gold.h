@@ -11,11 +11,6 @@ typedef ulong vdvr_count;
 typedef std::uint64_t vdvr_count;
 #endif
 
-// Of the phases between two nodes, so many are summed at a time: they share what they read, and while one waits
-// for a sum the others go on.
-#define VDVR_PHASES_TOGETHER(phases) \
-  ((phases) == 2 ? 1 : (phases) == 4 ? 3 : (phases) == 8 ? 7 : (phases) == 16 ? 5 : 4)
-
 // A rectangle of columns.
 typedef struct {
   vdvr_count in_first, out_first;
@@ -43,7 +38,7 @@ typedef struct {
   int step;       // input nodes from one interval to the next
   int skipped;    // outputs before the first that is wanted
   int outputs;    // wanted
-  int pad;
+  int phases;     // outputs to an interval
 } VdvrAcross;
 
 #endif

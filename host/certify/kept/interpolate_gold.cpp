@@ -1,6 +1,8 @@
 // Launcher of kernels/certify/kept/interpolate.cl.
 #include "host/certify/kept/interpolate_gold.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <stdexcept>
 #include <string>
@@ -18,11 +20,15 @@ namespace {
 
 constexpr std::int64_t lanes_of_group = 16;
 
-opencl::Defines defines(int lanes, int phases, int taps) {
+opencl::Defines defines(int lanes, int taps) {
   return {{"VDVR_LANES", std::to_string(lanes)},
           {"VDVR_RUN", std::to_string(AlongZ::run)},
-          {"VDVR_PHASES", std::to_string(phases)},
           {"VDVR_TAPS", std::to_string(taps)}};
+}
+
+// Of the phases between two nodes, so many are summed at a time: while one waits for a sum the others go on.
+int phases_together(int phases) {
+  return phases <= 2 ? 1 : phases == 4 ? 3 : phases == 8 ? 7 : phases == 16 ? 5 : 4;
 }
 
 // Eight columns have as many sums, and sixteen beside them: of vectors that take two registers each they do
@@ -32,9 +38,9 @@ int lanes_along_z(opencl::State& state) {
   return tuned == 16 && state.device.getInfo<CL_DEVICE_NATIVE_VECTOR_WIDTH_FLOAT>() <= 8 ? 8 : tuned;
 }
 
-// Whole groups of the phases that a work-item makes together, SUMS of interpolate.cl.
+// Whole groups of the phases that a work-item makes together.
 std::vector<float> padded(int phases, int taps, std::span<const float> weights) {
-  const std::int64_t together = VDVR_PHASES_TOGETHER(phases), wanted = phases - 1;
+  const std::int64_t together = phases_together(phases), wanted = phases - 1;
   std::vector<float> out(at(std::max<std::int64_t>(1, (wanted + together - 1) / together * together) * taps),
                          0.0f);
   std::copy(weights.begin(), weights.end(), out.begin());
@@ -93,7 +99,7 @@ void AlongZ::operator()(opencl::State& state, const opencl::DeviceArray<float>& 
   const auto on_device = opencl::copied<VdvrColumns>(state, parts, "columns to interpolate");
   const int lanes = lanes_along_z(state);
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrAlongZ> kernel(
-      state, "certify/kept/interpolate", "along_z", defines(lanes, 1, 2));
+      state, "certify/kept/interpolate", "along_z", defines(lanes, 2));
   kernel(opencl::in_groups(state.info,
                            {count(groups_ * lanes_of_group / lanes), count((shape.columns_x + 7) / 8),
                             count(std::int64_t{shape.columns_y} * shape.parts)},
@@ -107,14 +113,16 @@ Across::Across(opencl::State& state, int phases, int taps, std::span<const float
       weights_(state, std::span<const float>(padded(phases, taps, weights)), "weights of gold") {}
 
 void Across::operator()(opencl::State& state, const opencl::DeviceArray<float>& in,
-                        const opencl::DeviceArray<float>& out, const VdvrAcross& shape) const {
+                        const opencl::DeviceArray<float>& out, VdvrAcross shape) const {
+  shape.phases = phases_;
   const int lanes = column_tuning(state.info).lanes;
   // Intervals side by side read nearly the same nodes: one after another where a box does not stay in the
   // second cache meanwhile.
   constexpr std::uint64_t cache = std::uint64_t{512} << 10;
   const bool is_large = 4 * count(shape.z) * count(shape.others) * count(shape.intervals) > cache;
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrAcross> kernel(
-      state, "certify/kept/interpolate", "across", defines(lanes, phases_, taps_));
+      state, "certify/kept/interpolate", fmt::format("across_{}", phases_together(phases_)),
+      defines(lanes, taps_));
   kernel(opencl::in_groups(state.info,
                            {count(shape.z / lanes), count(shape.others),
                             count(std::int64_t{shape.intervals} * shape.boxes)},

@@ -49,9 +49,10 @@ class AlongZ {
 class Across {
  public:
   Across(opencl::State& state, int phases, int taps, std::span<const float> weights);
-  /// Enqueues. Cost: `taps` multiply-adds an output; error: taps + 1 roundings of sum |weight| |input|.
+  /// Phases of `shape` are not read. Enqueues. Cost: `taps` multiply-adds an output; error: taps + 1
+  /// roundings of sum |weight| |input|.
   void operator()(opencl::State& state, const opencl::DeviceArray<float>& in,
-                  const opencl::DeviceArray<float>& out, const VdvrAcross& shape) const;
+                  const opencl::DeviceArray<float>& out, VdvrAcross shape) const;
 
  private:
   int phases_ = 1, taps_ = 2;
