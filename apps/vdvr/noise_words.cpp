@@ -44,6 +44,8 @@ std::optional<FieldNoise> noise_of_plan(Device& device, const Planned& planned, 
   out.sigmas = planned.made.asked.sigmas;
   out.split = split_of_views(device, planned.scan, plan.field, planned.noise.noise->model, progress);
   out.forecasts = forecast_in_sigma(plan, *planned.made.sigma, multiples);
+  for (SigmaForecast& one : out.forecasts)  // of more bricks
+    if (out.sigmas && one.multiple == *out.sigmas) one.samples_ratio = plan.samples_ratio;
   out.rings = ring_noise(planned.scan, planned.understood.flats);
   return out;
 }

@@ -376,11 +376,11 @@ Forecaster::Fates Forecaster::foresee(const NodeTolerance& tolerance, bool by_th
   for (const auto& [key, s] : strata)
     for (const std::int64_t i : s.candidates) sampled[at(i)] = 1;
   const auto classes = classify(tolerance, sampled);
-  measured_.clear();
+  if (!by_the_way) measured_.clear();
   for (auto& [key, s] : strata)
     for (const std::int64_t i : s.candidates) {
       const Classified& c = classes[at(i)];
-      if (c.measure.total >= 0) measured_.push_back(c.measure);
+      if (c.measure.total >= 0 && !by_the_way) measured_.push_back(c.measure);
       s.seen += 1;
       s.tile_samples += c.samples;
       if (c.measure.total >= 0) s.share[c.fate(settings.rate)] += 1;

@@ -61,8 +61,8 @@ class Forecaster {
   /// which tells the storage, among those to look at. `tolerance` is what the node test may take. Raising
   /// bricks after closing is not foreseen. Cost: about 1 % of the build.
   BuildForecast forecast(const NodeTolerance& tolerance);
-  /// Of that, the samples stored per base sample. Cost: half; `by_the_way` of a quarter of the bricks, an
-  /// eighth: what is foreseen then differs from the other by some 3 %, and by up to 10.
+  /// Of that, the samples stored per base sample. Cost: half. `by_the_way`: by a quarter of the bricks, for a
+  /// quarter of that; the two differ by some 3 %, and by up to 10. measured() stays.
   double samples_ratio(const NodeTolerance& tolerance, bool by_the_way);
 
   /// What closing takes that adds so many levels to bricks, one in each round of repair: their tiles anew and

@@ -33,7 +33,7 @@ double sup_constant(const NodeFunctional& functional, double band);
 
 /// sup_constant() of its first moments, sum_i taps[i] (first + i)^n f(first + i), n = 0 .. count - 1. Of
 /// order 0: only moment 0 stands for anything, f(0). At most most_moments. Moments' symbols are derivatives
-/// of one another. Cost: two FFTs each, and some 20,000 operations a tap.
+/// of one another. Cost: one FFT each, and some 20,000 operations a tap.
 std::vector<double> moment_sup_constants(const NodeFunctional& functional, double band, std::size_t count);
 inline constexpr std::size_t most_moments = 17;
 

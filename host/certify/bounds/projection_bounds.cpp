@@ -318,8 +318,11 @@ bool looks_closely(const FilteredScan& scan) {
   constexpr double near = 0.8;
   const Coverage coverage(scan.geometry, scan.views);
   double least = HUGE_VAL;
-  for (const Corners& part : RegionOutline(coverage, 0).parts(coverage.heights()))
-    for (const ViewMatrix& m : scan.views) least = std::min(least, view_box(m, part).lambda_min);
+  std::vector<ViewBox> boxes(scan.views.size());
+  for (const Corners& part : RegionOutline(coverage, 0).parts(coverage.heights())) {
+    view_boxes(scan.views, part, boxes);
+    for (const ViewBox& seen : boxes) least = std::min(least, seen.lambda_min);
+  }
   return least < near;
 }
 

@@ -411,7 +411,8 @@ double ConeTiles::largest(std::size_t axis, const GoldFilter& filter) {
 }
 
 // At least the sum over a part's views: those whose bands have the same constants by the largest band and
-// growth among them.
+// growth among them. Errors that leave out what is negligible fall with neither by more than the 2^-44 that
+// `at` adds.
 double ConeTiles::most_of(const std::vector<ViewAtPart>& part, std::size_t axis,
                           const ProjectiveError& error) const {
   std::array<ViewAtPart, ProjectiveError::bands> alike{};
@@ -422,7 +423,7 @@ double ConeTiles::most_of(const std::vector<ViewAtPart>& part, std::size_t axis,
   }
   double sum = 0;
   for (const ViewAtPart& most : alike)
-    if (most.weight > 0) sum += most.weight * error.at(most.band, most.rho);
+    if (most.weight != 0) sum += most.weight * error.at(most.band, most.rho);
   return sum * (1 + 1e-12);
 }
 
@@ -442,15 +443,16 @@ double ConeTiles::largest(std::size_t axis, const ProjectiveError& error) const 
     std::vector<double> sums(at(std::min(together, std::ssize(order) - first)), 0.0);
     parallel_for(std::ssize(sums), {}, "", [&](std::int64_t i) {
       for (const ViewAtPart& view : parts[order[at(first + i)].second])
-        sums[at(i)] += view.weight * error.at(view.band, view.rho);
+        if (view.weight != 0)
+          sums[at(i)] += view.weight * error.at(view.band, view.rho);  // 0, if of infinity
     });
     largest = std::max(largest, *std::ranges::max_element(sums));
   }
   return largest * (1 + 1e-12);
 }
 
-// At most what a filter errs along an axis: of some parts, as if no view grew and none saw less than
-// `fewest` radians a node.
+// At most what a filter errs along an axis: of some parts, as if no view grew, without views that
+// see less than `fewest` radians a node.
 double ConeTiles::least_of(std::size_t axis, const ProjectiveError& error, double fewest) const {
   constexpr std::size_t some = 8;
   double largest = 0;

@@ -120,11 +120,11 @@ class ConeTiles {
     return std::max(least, axis == 2 ? band_[2] : std::max(band_[0], band_[1]));
   }
   [[nodiscard]] double largest(std::size_t axis, const ProjectiveError& error) const;
+  /// The same of a filter, found once.
+  double largest(std::size_t axis, const GoldFilter& filter);
   [[nodiscard]] double most_of(const std::vector<ViewAtPart>& part, std::size_t axis,
                                const ProjectiveError& error) const;
   [[nodiscard]] double least_of(std::size_t axis, const ProjectiveError& error, double fewest) const;
-  /// The same of a filter, found once.
-  double largest(std::size_t axis, const GoldFilter& filter);
   // What is known of a filter: by axis the largest sum over the views of what it errs.
   struct Known {
     ProjectiveError error;

@@ -26,7 +26,8 @@ opencl::Defines defines(int lanes, int taps) {
           {"VDVR_TAPS", std::to_string(taps)}};
 }
 
-// Of the phases between two nodes, so many are summed at a time: while one waits for a sum the others go on.
+// Of the phases between two nodes, a work-item sums so many at a time, for which there is a kernel: sums that
+// do not wait for each other.
 int phases_together(int phases) {
   return phases <= 2 ? 1 : phases == 4 ? 3 : phases == 8 ? 7 : phases == 16 ? 5 : 4;
 }

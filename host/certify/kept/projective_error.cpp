@@ -24,8 +24,8 @@ std::vector<double> all_bands(double highest) {
   return out;
 }
 
-// Filters of several rates have phases in common, and a plan's are those of the build: the last few are
-// remembered.
+// Filters of several rates have phases in common, and a plan's are those of the build: some thousand are
+// remembered, then all are forgotten. `phase` is of order 0.
 std::vector<double> known_constants(const NodeFunctional& phase, double band, std::size_t moments) {
   constexpr std::size_t most = 4096;
   static std::mutex mutex;

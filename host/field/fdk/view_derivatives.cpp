@@ -157,7 +157,7 @@ VDVR_WIDE void look(const Matrices& matrix, const Vec3* corners, std::size_t cou
 // X_e being affine in u and v, where u and v are extreme. lambda is affine too.
 ViewBox box_of(const ViewMatrix& matrix, const Seen& seen, std::size_t k) {
   ViewBox box;
-  // A corner that is no number is among the terms.
+  // NaN of a corner stays in the magnitude.
   box.lambda_min = seen.lambda[k] - row_rounding * seen.magnitude[2][k];
   if (!(box.lambda_min > 0)) return box;
   for (std::size_t i = 0; i < 2; ++i) {
@@ -180,6 +180,7 @@ ViewBox box_of(const ViewMatrix& matrix, const Seen& seen, std::size_t k) {
 }  // namespace
 
 void view_boxes(std::span<const ViewMatrix> views, std::span<const Vec3> corners, std::span<ViewBox> out) {
+  if (out.size() != views.size()) throw std::logic_error("view_boxes: one box for each view");
   for (std::size_t first = 0; first < views.size(); first += together) {
     const std::size_t n = std::min(together, views.size() - first);
     Matrices matrices;

@@ -41,7 +41,7 @@ struct ViewBox {
   Vec3 growth{};              ///< |lambda_e|
 };
 ViewBox view_box(const ViewMatrix& matrix, std::span<const Vec3> corners);
-/// Of as many views as `out` holds, by vectors of them: the same bits. Cost: some 60 operations a corner and
+/// Of each view, by vectors of them: the same bits. Cost: some 60 operations a corner and
 /// view.
 void view_boxes(std::span<const ViewMatrix> views, std::span<const Vec3> corners, std::span<ViewBox> out);
 inline ViewBox view_box(const ViewMatrix& matrix, const Vec3& low, const Vec3& high) {

@@ -173,14 +173,34 @@ std::pair<double, std::array<double, 3>> trilinear(const std::vector<double>& ti
   return {value, steps};
 }
 
-// rho: the largest error beyond what steps are charged, relative to the tile's largest magnitude, or to
-// the whole scale of a normalised format; on constant, affine and random tiles. Units that round products of
-// weights err even where all samples are equal.
-double measure_constants(opencl::State& state, const FilterProbe& charged, SampleType type) {
+// Normalised formats hold 0 to 1 only.
+std::vector<float> random_tile(SampleType type) {
   std::mt19937 random(7);
+  std::uniform_real_distribution<double> uniform(type != SampleType::f32 ? 0 : -1, 1);
+  return cube([&](double, double, double) { return uniform(random); });
+}
+
+// The largest error of a tile beyond what steps are charged, relative to the tile's largest magnitude, or to
+// the whole scale of a normalised format.
+double beyond_steps(opencl::State& state, const FilterProbe& charged, SampleType type,
+                    const std::vector<float>& values, const std::vector<ProbePoint>& points) {
+  const Tile tile = make_tile(state, values, type);
+  const auto read = read_points(state, tile.image, points);
+  double magnitude = type != SampleType::f32 ? 1 : 0, largest = 0;
+  for (const double v : tile.truth) magnitude = std::max(magnitude, std::abs(v));
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const auto [truth, steps] = trilinear(tile.truth, points[i]);
+    const double beyond =
+        (std::abs(static_cast<double>(read[i]) - truth) - charged.of_steps(steps)) / magnitude;
+    if (!(beyond <= largest)) largest = std::isnan(beyond) ? std::numeric_limits<double>::infinity() : beyond;
+  }
+  return largest;
+}
+
+// rho: on constant, affine and random tiles. Units that round products of weights err even where all samples
+// are equal.
+double measure_constants(opencl::State& state, const FilterProbe& charged, SampleType type) {
   const bool normalised = type != SampleType::f32;
-  std::uniform_real_distribution<double> uniform(normalised ? 0 : -1, 1);
-  // Normalised formats hold 0 to 1 only.
   const double offset = normalised ? 0 : 100, slope = normalised ? 0.01 : 1;
   const std::vector<std::vector<float>> tiles{
       cube([&](double, double, double) { return normalised ? 1.0 : 1.2345678; }),
@@ -188,22 +208,23 @@ double measure_constants(opencl::State& state, const FilterProbe& charged, Sampl
       cube([&](double x, double y, double z) {
         return offset + slope * (0.31 * x + 0.17 * (63 - y) + 0.23 * z);
       }),
-      cube([&](double, double, double) { return uniform(random); })};
+      random_tile(type)};
   const auto points = scattered_points();
   double rho = 0;
-  for (const auto& values : tiles) {
-    const Tile tile = make_tile(state, values, type);
-    const auto read = read_points(state, tile.image, points);
-    double magnitude = normalised ? 1 : 0;
-    for (const double v : tile.truth) magnitude = std::max(magnitude, std::abs(v));
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const auto [truth, steps] = trilinear(tile.truth, points[i]);
-      const double beyond =
-          (std::abs(static_cast<double>(read[i]) - truth) - charged.of_steps(steps)) / magnitude;
-      if (!(beyond <= rho)) rho = std::isnan(beyond) ? std::numeric_limits<double>::infinity() : beyond;
-    }
-  }
+  for (const auto& values : tiles) rho = std::max(rho, beyond_steps(state, charged, type, values, points));
   return rho;
+}
+
+// Whether some points of what was measured then err by no more now: a setting of the driver, or a program
+// that measures better, is not told by what the device says of itself.
+bool errs_no_more(opencl::State& state, const SamplerProbe& known) {
+  constexpr std::size_t some = 1024;
+  auto points = scattered_points();
+  points.resize(some);
+  return std::ranges::all_of(std::array{SampleType::f32, SampleType::u16, SampleType::u8}, [&](SampleType t) {
+    const FilterProbe& filter = known.of(t);
+    return !filter.image3d || beyond_steps(state, filter, t, random_tile(t), points) <= filter.constant_error;
+  });
 }
 
 // The weights of all corners of a cell, by tiles of which every second sample along each axis is 1, all
@@ -408,7 +429,7 @@ void measure_rates(opencl::State& state, SamplerProbe& p) {
 }
 
 SamplerProbe filters_of(opencl::State& state) {
-  if (auto known = remembered_filters(state)) return *std::move(known);
+  if (auto known = remembered_filters(state); known && errs_no_more(state, *known)) return *std::move(known);
   SamplerProbe measured = measure_filters(state);
   remember_filters(state, measured);
   return measured;

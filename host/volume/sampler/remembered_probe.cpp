@@ -20,14 +20,16 @@ namespace {
 
 // Someone who stands between answers for the device, and does not say that it is not the device.
 bool behind_a_layer() {
-  for (const char* variable : {"LD_PRELOAD", "OPENCL_LAYERS"})
+  for (const char* variable : {"LD_PRELOAD", "LD_AUDIT", "OPENCL_LAYERS"})
     if (const char* value = std::getenv(variable); value != nullptr && *value != '\0') return true;
   return false;
 }
 
 std::string head(const opencl::State& state) {
-  return "vdvr: what a device's texture unit does\n" + opencl::identity(state) +
-         sha256_of_text(opencl::resolve_source("volume/sampler/probe_sampler.cl")) + '\n';
+  constexpr int method = 1;  // one more with every change of what is measured, or charged for it
+  return fmt::format("vdvr: what a device's texture unit does, method {}\n", method) +
+         opencl::identity(state) + sha256_of_text(opencl::resolve_source("volume/sampler/probe_sampler.cl")) +
+         '\n';
 }
 
 std::string file_of(const std::string& head) { return "samplers/" + sha256_of_text(head); }
@@ -47,13 +49,19 @@ bool read_numbers(std::istream& line, FilterProbe& p) {
   return !line.fail() && (image3d == 0 || image3d == 1);
 }
 
+// The last line says that the others are what was written.
+std::string sealed(const std::string& text) { return text + sha256_of_text(text) + '\n'; }
+constexpr std::size_t seal_size = 65;
+
 }  // namespace
 
 std::optional<SamplerProbe> remembered_filters(const opencl::State& state) {
   if (behind_a_layer()) return std::nullopt;
   const std::string first = head(state);
   const auto known = read_cached(file_of(first));
-  if (!known || !known->starts_with(first) || !known->ends_with("\nend\n")) return std::nullopt;
+  if (!known || !known->starts_with(first) || known->size() < first.size() + seal_size ||
+      sealed(known->substr(0, known->size() - seal_size)) != *known)
+    return std::nullopt;
   std::istringstream lines(known->substr(first.size()));
   SamplerProbe p;
   for (FilterProbe* const filter : std::array<FilterProbe*, 3>{&p, &p.u16, &p.u8}) {
@@ -63,12 +71,10 @@ std::optional<SamplerProbe> remembered_filters(const opencl::State& state) {
     numbers.imbue(std::locale::classic());
     if (!read_numbers(numbers, *filter)) return std::nullopt;
   }
-  std::string end;
   std::getline(lines, p.note);
-  std::getline(lines, end);
   const DeviceInfo& now = state.info;
-  if (end != "end" || p.note.empty() || p.image3d != now.linear_float_image ||
-      p.u16.image3d != now.linear_u16_image || p.u8.image3d != now.linear_u8_image)
+  if (p.note.empty() || p.image3d != now.linear_float_image || p.u16.image3d != now.linear_u16_image ||
+      p.u8.image3d != now.linear_u8_image)
     return std::nullopt;
   return p;
 }
@@ -86,7 +92,7 @@ void remember_filters(const opencl::State& state, const SamplerProbe& probe) {
     }
     text += line + '\n';
   }
-  write_cached(file_of(first), text + probe.note + "\nend\n");
+  write_cached(file_of(first), sealed(text + probe.note + '\n'));
 }
 
 }  // namespace vdvr

@@ -1,5 +1,5 @@
-// What a device's texture unit was found to do, from one process to the next: by all that opens a device's
-// test is remembered by (host/base/opencl/trust.hpp) and the text of the kernels that measure.
+// What a device's texture unit was found to do, remembered from one process to the next: by the device's
+// identity (host/base/opencl/trust.hpp) and the text of the kernels that measure.
 #pragma once
 
 #include <optional>
@@ -10,7 +10,7 @@
 namespace vdvr {
 
 /// As measured on such a device, without rates. None where nothing is remembered, where a file holds anything
-/// else, or where a layer may stand between the program and the device (LD_PRELOAD, OPENCL_LAYERS).
+/// else, or where a layer may stand between the program and the device (LD_PRELOAD, LD_AUDIT, OPENCL_LAYERS).
 std::optional<SamplerProbe> remembered_filters(const opencl::State& state);
 
 /// Nothing of filters whose numbers are not finite, or behind such a layer.

@@ -73,7 +73,8 @@ __kernel void along_z(__global float* out, __global const float* in, __global co
   }
 
 // The nodes of an interval, which lies between the two middle ones of its inputs: the first of these itself,
-// and the others by weights[phase - 1][tap], SUMS phases at a time, which share what they read.
+// and the others by weights[phase - 1][tap], in whole groups of SUMS phases, which share what they
+// read.
 #define ACROSS(SUMS, FOR_SUMS)                                                                              \
   __kernel void across_##SUMS(__global float* out, __global const float* in, __global const float* weights, \
                               VdvrAcross s) {                                                               \
