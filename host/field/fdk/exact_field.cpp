@@ -10,6 +10,7 @@
 #include <numeric>
 #include <optional>
 #include <span>
+#include <thread>
 
 #include "host/base/system/parallel.hpp"
 #include "host/base/system/wide.hpp"
@@ -89,6 +90,22 @@ VDVR_WIDE void sum_columns(const double* a, std::int64_t columns, std::int64_t r
     eight_at(sums + m * step) = sum;
   }
 }
+
+/// Which of n points, or heights, a task takes: whole groups, as many as leave every thread some tasks.
+struct GroupTasks {
+  explicit GroupTasks(std::size_t points) : n(points) {
+    const std::size_t groups = (n + group - 1) / group,
+                      shares = 4 * std::max<std::size_t>(1, std::thread::hardware_concurrency());
+    each = group * std::clamp<std::size_t>(groups / shares, 1, most);
+    count = static_cast<std::int64_t>((n + each - 1) / each);
+  }
+  [[nodiscard]] std::size_t first(std::int64_t task) const {
+    return std::min(n, static_cast<std::size_t>(task) * each);
+  }
+  static constexpr std::size_t most = 16;
+  std::size_t n, each;
+  std::int64_t count;
+};
 
 // sum over m of lines[m][i] waves[m][i].
 VDVR_WIDE void sum_lines(const double* lines, const double* waves, std::int64_t n, double* out) {
@@ -226,30 +243,33 @@ ExactField::ExactField(const ProjectionSet& scan, const FieldOptions& field, con
 }
 
 // lambda^-2 times the series in u and v, view by view.
-// Some points go together: a view's coefficients are read once for all of them, and sums run side by side.
+// Some points go together: a view's coefficients come from memory once for all groups of a task, and from the
+// cache for each of them, whose sums run side by side.
 std::vector<double> ExactField::at_cone(std::span<const Vec3> points, const Progress& progress) const {
   const std::int64_t U = geometry_.columns, V = geometry_.rows;
   std::vector<double> values(points.size());
-  const auto groups = static_cast<std::int64_t>((points.size() + group - 1) / group);
-  parallel_for(groups, progress, "exact points", [&](std::int64_t g) {
-    const std::size_t first = static_cast<std::size_t>(g) * group,
-                      count = std::min(group, points.size() - first);
+  const GroupTasks tasks(points.size());
+  parallel_for(tasks.count, progress, "exact points", [&](std::int64_t t) {
     std::vector<double> lines(group * static_cast<std::size_t>(U)), along_u(lines.size()),
         along_v(group * static_cast<std::size_t>(V));
     std::array<double, group> u{}, v{}, lambda{}, sums{};
     for (std::size_t k = 0; k < views_.size(); ++k) {
-      for (std::size_t i = 0; i < count; ++i) {
-        const Vec3 seen = projected(views_[k], points[first + i]);
-        u[i] = seen[0];
-        v[i] = seen[1];
-        lambda[i] = seen[2];
+      throw_if_stopped();
+      for (std::size_t first = tasks.first(t); first < tasks.first(t + 1); first += group) {
+        const std::size_t count = std::min(group, points.size() - first);
+        for (std::size_t i = 0; i < count; ++i) {
+          const Vec3 seen = projected(views_[k], points[first + i]);
+          u[i] = seen[0];
+          v[i] = seen[1];
+          lambda[i] = seen[2];
+        }
+        put_waves(u, U, along_u);
+        put_waves(v, V, along_v);
+        sum_columns(coefficients_.get() + static_cast<std::int64_t>(k) * U * V, U, V, along_v.data(),
+                    lines.data());
+        sum_lines(lines.data(), along_u.data(), U, sums.data());
+        for (std::size_t i = 0; i < count; ++i) values[first + i] += sums[i] / (lambda[i] * lambda[i]);
       }
-      put_waves(u, U, along_u);
-      put_waves(v, V, along_v);
-      sum_columns(coefficients_.get() + static_cast<std::int64_t>(k) * U * V, U, V, along_v.data(),
-                  lines.data());
-      sum_lines(lines.data(), along_u.data(), U, sums.data());
-      for (std::size_t i = 0; i < count; ++i) values[first + i] += sums[i] / (lambda[i] * lambda[i]);
     }
   });
   return values;
@@ -263,36 +283,50 @@ std::vector<double> ExactField::at(std::span<const Vec3> points, const Progress&
   std::vector<std::pair<double, const std::vector<std::size_t>*>> heights;
   for (const auto& [z, members] : by_height) heights.emplace_back(z, &members);
 
-  // Heights go together in groups, so that one pass over the coefficients serves the whole group.
-  std::vector<double> values(points.size());
-  const auto groups = static_cast<std::int64_t>((heights.size() + group - 1) / group);
-  parallel_for(groups, progress, "exact points", [&](std::int64_t g) {
-    const std::size_t first = static_cast<std::size_t>(g) * group,
-                      count = std::min(group, heights.size() - first);
-    std::vector<double> along_v(group * static_cast<std::size_t>(V)),
-        lines(group * static_cast<std::size_t>(U)), columns(lines.size()), along_u(lines.size());
-    std::array<double, group> places{}, sums{};
+  // Heights go together in groups, so that one pass over the coefficients serves the whole group, and groups
+  // in tasks, as those of cone beam.
+  struct Group {
+    std::vector<double> along_v;
     std::vector<std::pair<std::size_t, std::size_t>> members;  // height of the group, point
-    for (std::size_t h = 0; h < count; ++h) {
+  };
+  const auto group_of = [&](std::size_t first) {
+    Group of{std::vector<double>(group * static_cast<std::size_t>(V)), {}};
+    std::array<double, group> places{};
+    for (std::size_t h = 0; h < std::min(group, heights.size() - first); ++h) {
       places[h] = heights[first + h].first / geometry_.pitch_v + 0.5 * static_cast<double>(V - 1);
-      for (const std::size_t i : *heights[first + h].second) members.emplace_back(h, i);
+      for (const std::size_t i : *heights[first + h].second) of.members.emplace_back(h, i);
     }
-    put_waves(places, V, along_v);
+    put_waves(places, V, of.along_v);
+    return of;
+  };
+  std::vector<double> values(points.size());
+  const GroupTasks tasks(heights.size());
+  parallel_for(tasks.count, progress, "exact points", [&](std::int64_t t) {
+    std::vector<double> lines(group * static_cast<std::size_t>(U)), columns(lines.size()),
+        along_u(lines.size());
+    std::array<double, group> places{}, sums{};
+    std::vector<Group> of_task;
+    for (std::size_t first = tasks.first(t); first < tasks.first(t + 1); first += group)
+      of_task.push_back(group_of(first));
     for (std::size_t k = 0; k < static_cast<std::size_t>(K); ++k) {
+      throw_if_stopped();
       const double c = std::cos(geometry_.theta_rad[k]), s = std::sin(geometry_.theta_rad[k]);
-      sum_columns(coefficients_.get() + static_cast<std::int64_t>(k) * U * V, U, V, along_v.data(),
-                  lines.data());
-      for (std::size_t from = 0; from < members.size(); from += group) {
-        const std::size_t together = std::min(group, members.size() - from);
-        for (std::size_t j = 0; j < together; ++j) {
-          const Vec3& p = points[members[from + j].second];
-          places[j] = (p[0] * c + p[1] * s) / geometry_.pitch_u + geometry_.center_of_view(k);
-          for (std::size_t m = 0; m < static_cast<std::size_t>(U); ++m)
-            columns[m * group + j] = lines[m * group + members[from + j].first];
+      for (const Group& of : of_task) {
+        sum_columns(coefficients_.get() + static_cast<std::int64_t>(k) * U * V, U, V, of.along_v.data(),
+                    lines.data());
+        for (std::size_t from = 0; from < of.members.size(); from += group) {
+          const std::size_t together = std::min(group, of.members.size() - from);
+          for (std::size_t j = 0; j < together; ++j) {
+            const auto& [height, point] = of.members[from + j];
+            const Vec3& p = points[point];
+            places[j] = (p[0] * c + p[1] * s) / geometry_.pitch_u + geometry_.center_of_view(k);
+            for (std::size_t m = 0; m < static_cast<std::size_t>(U); ++m)
+              columns[m * group + j] = lines[m * group + height];
+          }
+          put_waves(places, U, along_u);
+          sum_lines(columns.data(), along_u.data(), U, sums.data());
+          for (std::size_t j = 0; j < together; ++j) values[of.members[from + j].second] += sums[j];
         }
-        put_waves(places, U, along_u);
-        sum_lines(columns.data(), along_u.data(), U, sums.data());
-        for (std::size_t j = 0; j < together; ++j) values[members[from + j].second] += sums[j];
       }
     }
   });
