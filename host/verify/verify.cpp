@@ -105,19 +105,11 @@ class TestedBricks {
         now_(volume.level.size()) {}
 
   /// Tests bricks at the first rate at which they can be, and those that it leaves undecided, or that are
-  /// looked at there too (`looked_at` is 2), on finer gold: of its own nodes as long as that is less work,
-  /// then made of those.
+  /// looked at there too (`looked_at` is 2), on finer gold.
   void sweep(const std::vector<std::uint8_t>& selected, const std::vector<std::uint8_t>& looked_at,
              VerifyResult& result) {
-    const bool dear = field_.nodes_are_dear();
-    // Gold coarser than the nodes that determine F is its own, and an eighth of the nodes.
-    const int own = std::min(volume_.rate, field_.across()), first = dear ? std::max(1, own / 2) : own;
-    std::vector<int> finer;
-    if (own == field_.across())
-      for (int rate = 2 * own; rate <= std::min(finest_rate(volume_), std::max(2 * volume_.rate, 4 * own));
-           rate *= 2)
-        finer.push_back(rate);
-    const int last = finer.empty() ? own : finer.back();
+    const std::vector<Step> steps = steps_of_sweep();
+    const int own = std::min(volume_.rate, field_.across()), last = steps.back().rates.back();
     const auto wants = [&](std::size_t i, int rate) {
       take(i);
       const Brick& b = bricks_[i];
@@ -125,20 +117,22 @@ class TestedBricks {
       return undecided(i) || (looked_at[i] > 1 && b.rate == b.tried && b.total >= 0 && 2 * b.tried == rate &&
                               rate <= 2 * std::max(own, field_.least_rate(i)));
     };
-    // Rates whose gold is made of the same nodes. Few bricks need what finer gold needs around them.
-    std::vector<std::vector<int>> steps;
-    if (first < own) steps.push_back({first});
-    steps.push_back({own});
-    if (dear && !finer.empty()) steps.emplace_back();
-    steps.back().insert(steps.back().end(), finer.begin(), finer.end());
-    std::vector<std::uint8_t> rest(selected.size());
     int before = 0;
-    for (const std::vector<int>& rates : steps) {
-      // Nodes are made for all that a run is given.
+    // Nodes are made for all that a run is given.
+    const auto wanted = [&](const std::vector<int>& rates) {
+      std::vector<std::uint8_t> rest(selected.size());
       for (std::size_t i = 0; i < rest.size(); ++i)
         rest[i] = selected[i] && (bricks_[i].tried > 0 || field_.least_rate(i) > before) &&
                   std::any_of(rates.begin(), rates.end(), [&](int rate) { return wants(i, rate); });
-      if (std::find(rest.begin(), rest.end(), 1) != rest.end()) run(rest, rates, wants, result);
+      return rest;
+    };
+    for (const Step& step : steps) {
+      if (step.rates.back() <= before) continue;
+      const bool sparse = serves(step, wanted(step.by_sparse));
+      const std::vector<int>& rates = sparse ? step.by_sparse : step.rates;
+      const std::vector<std::uint8_t> rest = wanted(rates);
+      if (std::find(rest.begin(), rest.end(), 1) != rest.end())
+        run(rest, rates, wants, result, sparse ? VerifyField::Made::sparse : VerifyField::Made::dense);
       before = rates.back();
     }
   }
@@ -173,6 +167,47 @@ class TestedBricks {
   [[nodiscard]] const std::vector<Brick>& bricks() const { return bricks_; }
 
  private:
+  // Rates whose gold is made of the same nodes. Where sparse nodes serve, they do for `by_sparse`.
+  struct Step {
+    std::vector<int> rates, by_sparse;
+    double worth = 1;  // how many times the dense nodes of this step they may be
+  };
+
+  // Gold coarser than the nodes that determine F is its own, and with cone beam an eighth of the nodes. Few
+  // bricks need what finer gold needs around them.
+  [[nodiscard]] std::vector<Step> steps_of_sweep() const {
+    const int own = std::min(volume_.rate, field_.across());
+    std::vector<int> finer;
+    if (own == field_.across())
+      for (int rate = 2 * own; rate <= std::min(finest_rate(volume_), std::max(2 * volume_.rate, 4 * own));
+           rate *= 2)
+        finer.push_back(rate);
+    if (!field_.nodes_are_dear()) {
+      finer.insert(finer.begin(), own);
+      return {{finer, {}}};
+    }
+    std::vector<Step> steps;
+    std::vector<int> by_sparse{own};
+    if (!finer.empty()) by_sparse.push_back(finer.front());
+    steps.push_back({{own}, by_sparse});
+    if (own > 1) {
+      // What this step leaves undecided takes dense nodes of the next one, up to eight times as many.
+      by_sparse.insert(by_sparse.begin(), own / 2);
+      steps.insert(steps.begin(), {{own / 2}, by_sparse, 2});
+    }
+    if (!finer.empty()) steps.push_back({finer, {}});
+    return steps;
+  }
+
+  [[nodiscard]] bool serves(const Step& step, const std::vector<std::uint8_t>& wanted) const {
+    // As far as F errs, a brick is not told from one that keeps its promise.
+    constexpr double most = 0.05;
+    return !step.by_sparse.empty() && std::find(wanted.begin(), wanted.end(), 1) != wanted.end() &&
+           field_.sparse_nodes_serve(
+               wanted, step.by_sparse, step.worth,
+               most * *std::min_element(limits_.promised.begin(), limits_.promised.end()));
+  }
+
   // A brick that errs by more at a node is wrong at every rate, and all is then.
   [[nodiscard]] bool undecided(std::size_t brick) const {
     const Brick& b = bricks_[brick];
@@ -182,7 +217,8 @@ class TestedBricks {
   }
 
   void run(const std::vector<std::uint8_t>& selected, const std::vector<int>& rates,
-           const std::function<bool(std::size_t, int)>& wants, VerifyResult& result) {
+           const std::function<bool(std::size_t, int)>& wants, VerifyResult& result,
+           VerifyField::Made made = VerifyField::Made::dense) {
     field_.run(
         selected, rates, wants,
         [&](const VerifyField::Piece& p) {
@@ -202,7 +238,7 @@ class TestedBricks {
           b.total = p.total;
           b.cell = p.worst_cell;
         },
-        progress_);
+        progress_, made);
     for (std::size_t i = 0; i < now_.size(); ++i) take(i);
     result.arithmetic = std::max(result.arithmetic, field_.arithmetic());
   }

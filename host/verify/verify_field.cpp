@@ -33,7 +33,7 @@ DeviceField upload(opencl::State& state, const MixedVolume& volume, int exponent
 double furthest_node(const MixedVolume& v, int across) {
   const double diagonal = std::hypot(v.grid.spacing[0], v.grid.spacing[1]);
   return 3.1 * diagonal / std::min(v.rate, across) +
-         static_cast<double>(VerifyNodes::reach) * diagonal / across;
+         static_cast<double>(VerifyNodes::Part{}.reach()) * diagonal / across;
 }
 
 }  // namespace
@@ -50,10 +50,11 @@ VerifyField::VerifyField(opencl::State& state, const ExactField& field, const Mi
                                   : cone_view_sups(field, progress)),
       stored_(upload(state, volume, -density)),
       rates_of_cone_(cone_node_rates(field, coverage_, volume.grid.spacing)),
+      sparse_rates_(sparse_node_rates(field, coverage_, volume.grid.spacing)),
       across_(field.views().empty() ? nodes_across(volume.grid, field.geometry()) : rates_of_cone_.across),
       nodes_(field.views().empty()
                  ? VerifyNodes(state, field, volume.grid, unit_, furthest_node(volume, across_))
-                 : VerifyNodes(state, field, coverage_, volume.grid, unit_, furthest_node(volume, across_))) {
+                 : VerifyNodes(state, field, coverage_, volume.grid, unit_)) {
   if (window) window_ = {window->first / unit_, window->second / unit_};
 }
 
@@ -118,8 +119,9 @@ ConeBox VerifyField::group_box(std::int64_t group, int rate, const VerifyNodes::
   ConeBox box;
   for (std::size_t a = 0; a < 3; ++a) {
     const int nodes = a < 2 ? part.across : part.along;
-    const double around = static_cast<double>(verify_halo) / rate +
-                          (rate > nodes ? static_cast<double>(VerifyNodes::reach) / nodes : 0.0);
+    const double around =
+        static_cast<double>(verify_halo) / rate +
+        (between_nodes(rate, nodes, part.points).made() ? static_cast<double>(part.reach()) / nodes : 0.0);
     const std::int64_t cells = bricks_to_group(n[a]) * volume_.granularity;
     box.low[a] = grid.origin[a] + (static_cast<double>(p[a] * cells) - around) * grid.spacing[a];
     box.high[a] =
@@ -129,13 +131,18 @@ ConeBox VerifyField::group_box(std::int64_t group, int rate, const VerifyNodes::
   return box;
 }
 
-void VerifyField::bound_groups(const Shape& s, const std::vector<std::uint8_t>& selected) {
+std::vector<std::int64_t> VerifyField::groups_of(const std::vector<std::uint8_t>& selected) const {
   std::vector<std::int64_t> groups;
   for (std::size_t i = 0; i < selected.size(); ++i)
     if (selected[i]) groups.push_back(group_of(static_cast<std::int64_t>(i)));
   std::sort(groups.begin(), groups.end());
   groups.erase(std::unique(groups.begin(), groups.end()), groups.end());
-  const ConePath path{nodes_.path(s.nodes, to_int(s.rate)), nodes_.cone_facts(), field_.rounding()};
+  return groups;
+}
+
+std::map<std::int64_t, FieldBounds> VerifyField::bounds_of_groups(
+    const Shape& s, const ConeNodeFacts& facts, const std::vector<std::int64_t>& groups) const {
+  const ConePath path{nodes_.path(s.nodes, to_int(s.rate)), facts, field_.rounding()};
   const auto bounds = [&](std::int64_t group, bool corrected) {
     return cone_field_bounds(field_.views(), sups_, group_box(group, to_int(s.rate), s.nodes), s.h, path,
                              corrected);
@@ -147,11 +154,57 @@ void VerifyField::bound_groups(const Shape& s, const std::vector<std::uint8_t>& 
   std::vector<FieldBounds> found(groups.size());
   parallel_for(static_cast<std::int64_t>(groups.size()), {}, "",
                [&](std::int64_t i) { found[at(i)] = bounds(groups[at(i)], corrected); });
-  of_groups_.clear();
-  for (std::size_t i = 0; i < groups.size(); ++i) {
-    of_groups_.emplace(groups[i], found[i]);
-    arithmetic_ = std::max(arithmetic_, found[i].arithmetic);
+  std::map<std::int64_t, FieldBounds> of_groups;
+  for (std::size_t i = 0; i < groups.size(); ++i) of_groups.emplace(groups[i], found[i]);
+  return of_groups;
+}
+
+// What bounds and tables are made for reaches further out than nodes that are used: by a group of bricks, and
+// by a tile or a block.
+bool VerifyField::far_from_sources(const VerifyNodes::Part& part) const {
+  const Grid& grid = volume_.grid;
+  const Index3 n = volume_.bricks();
+  Vec3 around{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const int nodes = a < 2 ? part.across : part.along;
+    around[a] = grid.spacing[a] * (static_cast<double>(bricks_to_group(n[a]) * volume_.granularity) +
+                                   static_cast<double>(part.reach() + verify_halo + 16) / nodes);
   }
+  const double r = coverage_.inner_radius() + part.furthest + std::hypot(around[0], around[1]);
+  const auto [low, high] = coverage_.heights();
+  return std::all_of(field_.views().begin(), field_.views().end(), [&](const ViewMatrix& m) {
+    const double least = m[2][3] + std::min(m[2][2] * (low - around[2]), m[2][2] * (high + around[2])) -
+                         r * std::hypot(m[2][0], m[2][1]);
+    return least >= 0.1 * m[2][3];
+  });
+}
+
+bool VerifyField::sparse_nodes_serve(const std::vector<std::uint8_t>& selected, std::span<const int> rates,
+                                     double worth, double most) const {
+  if (field_.views().empty() || sparse_rates_.across >= std::min(rates.front(), across_)) return false;
+  const std::vector<std::uint8_t> near = near_coverage(selected);
+  const auto nodes = [&](std::span<const int> of, Made made) {
+    double blocks = 0;
+    for (const Part& part : parts_of(near, of, made))
+      blocks += static_cast<double>(std::count(part.nodes.blocks.begin(), part.nodes.blocks.end(), 1));
+    return blocks;
+  };
+  const double sparse = nodes(rates, Made::sparse);
+  if (!(sparse > 0 && sparse <= worth * nodes(rates.first(1), Made::dense))) return false;
+  const Shape shape = shape_at(rates.front(), true, nodes_of(near, rates, false, Made::sparse));
+  if (!far_from_sources(shape.nodes)) return false;
+  // What places err in blocks so large is known when nodes are made: some 45 to 75 units on scans tried. And
+  // some groups show what all err.
+  ConeNodeFacts facts;
+  facts.place_u = facts.place_v = 75 * half_ulp;
+  facts.together = facts.calls = std::llround(std::sqrt(static_cast<double>(field_.views().size())));
+  const std::vector<std::int64_t> all = groups_of(near);
+  const std::size_t some = std::min<std::size_t>(64, all.size());
+  std::vector<std::int64_t> groups;
+  for (std::size_t i = 0; i < some; ++i) groups.push_back(all[i * all.size() / some]);
+  const auto bounds = bounds_of_groups(shape, facts, groups);
+  return std::all_of(bounds.begin(), bounds.end(),
+                     [&](const auto& of) { return of.second.arithmetic <= most; });
 }
 
 const FieldBounds& VerifyField::bounds_of(const Shape& s, std::int64_t brick) const {
@@ -160,12 +213,13 @@ const FieldBounds& VerifyField::bounds_of(const Shape& s, std::int64_t brick) co
 
 void VerifyField::run(const std::vector<std::uint8_t>& selected, std::span<const int> rates,
                       const std::function<bool(std::size_t brick, int rate)>& wants,
-                      const std::function<void(const Piece&)>& on_piece, const Progress& progress) {
+                      const std::function<void(const Piece&)>& on_piece, const Progress& progress,
+                      Made made) {
   for (const int rate : rates)
-    if (rate < 1 || (rates.size() > 1 && rate % across_ != 0))
+    if (rate < 1 || (made == Made::dense && rates.size() > 1 && rate % across_ != 0))
       throw InputError(fmt::format("gold of rate {} is not made of {} nodes a cell", rate, across_));
   arithmetic_ = 0;
-  const std::vector<Part> parts = parts_of(near_coverage(selected), rates);
+  const std::vector<Part> parts = parts_of(near_coverage(selected), rates, made);
   double done = 0;
   const double steps = static_cast<double>(parts.size() * (1 + rates.size()));
   const auto tick = [&](double share) { report(progress, "verify", (done + share) / steps); };
@@ -188,8 +242,10 @@ void VerifyField::run(const std::vector<std::uint8_t>& selected, std::span<const
         arithmetic_ = std::max(arithmetic_, s.bounds.arithmetic);
         s.correction = s.bounds.correction;
         if (!field_.views().empty()) {
-          bound_groups(s, wanted);
+          of_groups_ = bounds_of_groups(s, nodes_.cone_facts(), groups_of(wanted));
           s.correction = of_groups_.begin()->second.correction;
+          for (const auto& [group, bounds] : of_groups_)
+            arithmetic_ = std::max(arithmetic_, bounds.arithmetic);
         }
         const std::vector<Slab> slabs = slabs_of(s, wanted);
         for (std::size_t i = 0; i < slabs.size(); ++i) {
@@ -218,7 +274,7 @@ void VerifyField::run_slab(const Shape& s, const std::vector<std::array<std::int
                      per_item =
                          (s.cells + 1) * (s.cells + 1) * s.error_padded + s.cells * s.cells * (4 + s.words);
   const std::int64_t bytes =
-      4 * (per_block + nodes_.floats_per_block(static_cast<int>(s.rate), s.nx, s.z_padded) +
+      4 * (per_block + nodes_.floats_per_block(s.nodes, static_cast<int>(s.rate), s.nx, s.z_padded) +
            s.width * s.width * s.height * per_item);
   const std::uint64_t budget = std::min<std::uint64_t>(state_.memory.left() / 2, 96 << 20);
   const std::size_t together = at(std::clamp<std::int64_t>(static_cast<std::int64_t>(budget) / bytes, 1,

@@ -71,13 +71,22 @@ class VerifyField {
   /// The least rate of gold on whose cells the brick is trilinear.
   [[nodiscard]] int least_rate(std::size_t brick) const;
 
-  /// Measures bricks on gold of the rates, ascending; more than one only where each is a multiple of
-  /// `across()`. `wants` is asked of each selected brick at each rate, and at a rate only when all pieces of
-  /// the one before are known. Calls back once for each piece, in no particular order, and for a brick of
-  /// which gold of that rate tests no cell with an empty one.
+  /// What gold is made of: nodes of its own rate, or of `across()` where that is coarser; or of fewer nodes,
+  /// so far apart as F allows.
+  enum class Made { dense, sparse };
+  /// Of cone beam, whether sparse nodes for gold of these rates are at most `worth` times as many as dense
+  /// ones for the first rate alone, and F that is made of them errs by at most `most`, world units, about.
+  [[nodiscard]] bool sparse_nodes_serve(const std::vector<std::uint8_t>& selected, std::span<const int> rates,
+                                        double worth, double most) const;
+
+  /// Measures bricks on gold of the rates, ascending; of dense nodes more than one only where each is a
+  /// multiple of `across()`. `wants` is asked of each selected brick at each rate, and at a rate only when
+  /// all pieces of the one before are known. Calls back once for each piece, in no particular order, and for
+  /// a brick of which gold of that rate tests no cell with an empty one.
   void run(const std::vector<std::uint8_t>& selected, std::span<const int> rates,
            const std::function<bool(std::size_t brick, int rate)>& wants,
-           const std::function<void(const Piece&)>& on_piece, const Progress& progress);
+           const std::function<void(const Piece&)>& on_piece, const Progress& progress,
+           Made made = Made::dense);
   void run(const std::vector<std::uint8_t>& selected, int rate,
            const std::function<void(const Piece&)>& on_piece, const Progress& progress) {
     run(
@@ -102,17 +111,27 @@ class VerifyField {
   struct Slab;
   struct Part;
   [[nodiscard]] std::vector<Part> parts_of(const std::vector<std::uint8_t>& selected,
-                                           std::span<const int> rates) const;
-  [[nodiscard]] std::vector<std::vector<std::uint8_t>> joined(
-      std::vector<std::vector<std::uint8_t>> layers, const std::vector<std::uint8_t>& selected) const;
+                                           std::span<const int> rates, Made made) const;
+  [[nodiscard]] std::vector<std::vector<std::uint8_t>> joined(std::vector<std::vector<std::uint8_t>> layers,
+                                                              const std::vector<std::uint8_t>& selected,
+                                                              Made made) const;
+  /// How nodes lie, and how far around what is asked for.
+  struct Spread {
+    int across = 1, along = 1, points = 12;
+    std::int64_t around = 0, beyond = 0;  ///< nodes across z, and along it
+  };
+  [[nodiscard]] Spread spread_of(std::span<const int> rates, Made made) const;
   /// Heights to a cell of the grid that determine F along z, or `most`.
   [[nodiscard]] int nodes_along(int most) const;
   [[nodiscard]] VerifyNodes::Part nodes_of(const std::vector<std::uint8_t>& selected,
-                                           std::span<const int> rates, bool rows) const;
+                                           std::span<const int> rates, bool rows, Made made) const;
   [[nodiscard]] Shape shape_at(int rate, bool many, const VerifyNodes::Part& part) const;
   [[nodiscard]] ConeBox group_box(std::int64_t group, int rate, const VerifyNodes::Part& part) const;
   [[nodiscard]] std::int64_t group_of(std::int64_t brick) const;
-  void bound_groups(const Shape& shape, const std::vector<std::uint8_t>& selected);
+  [[nodiscard]] bool far_from_sources(const VerifyNodes::Part& part) const;
+  [[nodiscard]] std::vector<std::int64_t> groups_of(const std::vector<std::uint8_t>& selected) const;
+  [[nodiscard]] std::map<std::int64_t, FieldBounds> bounds_of_groups(
+      const Shape& shape, const ConeNodeFacts& facts, const std::vector<std::int64_t>& groups) const;
   [[nodiscard]] const FieldBounds& bounds_of(const Shape& shape, std::int64_t brick) const;
   [[nodiscard]] std::vector<Slab> slabs_of(const Shape& shape,
                                            const std::vector<std::uint8_t>& selected) const;
@@ -138,7 +157,7 @@ class VerifyField {
   Coverage coverage_;
   SupsByView sups_;
   DeviceField stored_;
-  ConeNodeRates rates_of_cone_;
+  ConeNodeRates rates_of_cone_, sparse_rates_;
   int across_;
   VerifyNodes nodes_;
   std::map<std::int64_t, FieldBounds> of_groups_;  // cone beam: at this rate

@@ -8,8 +8,9 @@
 namespace vdvr {
 namespace {
 
-// Of cone beam, heights of nodes that are back-projected together, but for those around them.
-constexpr std::int64_t most_heights = 128;
+// Of cone beam, heights of nodes that are back-projected together, but for those around them, of which sparse
+// nodes need more.
+constexpr std::int64_t most_heights = 128, most_sparse_heights = 512;
 
 /// Only the selected bricks in layers [first, end) along an axis.
 std::vector<std::uint8_t> layers_of(const std::vector<std::uint8_t>& selected, const Index3& n,
@@ -61,30 +62,55 @@ int VerifyField::nodes_along(int most) const {
 
 bool VerifyField::rows_serve(std::int64_t layers) const {
   if (!field_.views().empty()) return false;
-  const std::int64_t of_layer =
-      std::int64_t{volume_.granularity} * nodes_along(1 << 24) + 1 + 2 * (verify_halo + VerifyNodes::reach);
+  const std::int64_t of_layer = std::int64_t{volume_.granularity} * nodes_along(1 << 24) + 1 +
+                                2 * (verify_halo + VerifyNodes::Part{}.reach());
   return field_.geometry().rows <= std::min(layers, volume_.bricks()[2]) * of_layer;
 }
 
+VerifyField::Spread VerifyField::spread_of(std::span<const int> rates, Made made) const {
+  Spread s;
+  if (made == Made::sparse) {
+    s.across = sparse_rates_.across;
+    s.along = sparse_rates_.along;
+    s.points = sparse_points;
+    const auto around = [&](std::int64_t nodes) {
+      return s.points / 2 + (verify_halo * nodes + rates.front() - 1) / rates.front();
+    };
+    s.around = around(s.across);
+    s.beyond = around(s.along);
+    return s;
+  }
+  const std::int64_t reach = VerifyNodes::Part{}.reach();
+  s.across = std::min(rates.front(), across_);
+  s.along = nodes_along(rates.back());
+  s.around = rates.back() > s.across ? reach : verify_halo;
+  // Steps of the coarsest rate, and a polynomial's nodes.
+  s.beyond =
+      verify_halo * std::max<std::int64_t>(1, s.along / rates.front()) + (rates.back() > s.along ? reach : 0);
+  return s;
+}
+
 VerifyNodes::Part VerifyField::nodes_of(const std::vector<std::uint8_t>& selected, std::span<const int> rates,
-                                        bool rows) const {
+                                        bool rows, Made made) const {
   const Index3 n = volume_.bricks();
   const BoxOfBricks box(n, selected);
+  const Spread spread = spread_of(rates, made);
   VerifyNodes::Part p;
-  p.across = std::min(rates.front(), across_);
-  const std::int64_t side = std::int64_t{volume_.granularity} * p.across,
-                     around = rates.back() > p.across ? VerifyNodes::reach : verify_halo;
+  p.across = spread.across;
+  p.points = spread.points;
+  const std::int64_t side = std::int64_t{volume_.granularity} * p.across, around = spread.around;
+  // Corners of tested cells lie within a diagonal of gold, differences two steps on, a polynomial's nodes
+  // beyond these.
+  const double diagonal = std::hypot(volume_.grid.spacing[0], volume_.grid.spacing[1]);
+  p.furthest = diagonal * (3.1 / rates.front() + static_cast<double>(around) / p.across);
   p.first_x = box.first[0] * side - around;
   p.first_y = box.first[1] * side - around;
   p.nx = (box.end[0] - box.first[0]) * side + 1 + 2 * around;
   p.ny = (box.end[1] - box.first[1]) * side + 1 + 2 * around;
   p.rows = rows;
   if (!rows) {
-    p.along = nodes_along(rates.back());
-    const std::int64_t tall = std::int64_t{volume_.granularity} * p.along;
-    // Steps of the coarsest rate, and a polynomial's nodes.
-    const std::int64_t beyond = verify_halo * std::max<std::int64_t>(1, p.along / rates.front()) +
-                                (rates.back() > p.along ? VerifyNodes::reach : 0);
+    p.along = spread.along;
+    const std::int64_t tall = std::int64_t{volume_.granularity} * p.along, beyond = spread.beyond;
     p.first_z = box.first[2] * tall - beyond;
     p.nz = (box.end[2] - box.first[2]) * tall + 1 + 2 * beyond;
   }
@@ -116,10 +142,13 @@ VerifyNodes::Part VerifyField::nodes_of(const std::vector<std::uint8_t>& selecte
 
 // Of cone beam: neighbouring layers of bricks together, whose heights around them are then the same.
 std::vector<std::vector<std::uint8_t>> VerifyField::joined(std::vector<std::vector<std::uint8_t>> layers,
-                                                           const std::vector<std::uint8_t>& selected) const {
+                                                           const std::vector<std::uint8_t>& selected,
+                                                           Made made) const {
   const Index3 n = volume_.bricks();
-  const auto together =
-      std::max<std::int64_t>(1, most_heights / (std::int64_t{volume_.granularity} * rates_of_cone_.along));
+  const bool sparse = made == Made::sparse;
+  const auto together = std::max<std::int64_t>(
+      1, (sparse ? most_sparse_heights : most_heights) /
+             (std::int64_t{volume_.granularity} * (sparse ? sparse_rates_ : rates_of_cone_).along));
   std::vector<std::vector<std::uint8_t>> out;
   std::int64_t first = -1, last = -1;
   for (const std::vector<std::uint8_t>& layer : layers) {
@@ -138,20 +167,20 @@ std::vector<std::vector<std::uint8_t>> VerifyField::joined(std::vector<std::vect
 // The detector's rows serve all heights; where fewer heights are asked for, they are made themselves, layer
 // by layer of bricks. Both in bands of bricks whose nodes fit the memory.
 std::vector<VerifyField::Part> VerifyField::parts_of(const std::vector<std::uint8_t>& selected,
-                                                     std::span<const int> rates) const {
+                                                     std::span<const int> rates, Made made) const {
   const Index3 n = volume_.bricks();
   std::vector<std::vector<std::uint8_t>> runs;
   std::int64_t heights = 0;
   for (std::int64_t z = 0; z < n[2]; ++z) {
     std::vector<std::uint8_t> layer = layers_of(selected, n, 2, z, z + 1);
     if (std::find(layer.begin(), layer.end(), 1) == layer.end()) continue;
-    heights += nodes_of(layer, rates, false).nz;
+    heights += nodes_of(layer, rates, false, made).nz;
     runs.push_back(std::move(layer));
   }
   // Of cone beam no two nodes see the same rows.
   const bool rows = field_.views().empty() && field_.geometry().rows <= heights;
   if (rows) runs.assign(1, selected);
-  if (!field_.views().empty()) runs = joined(std::move(runs), selected);
+  if (!field_.views().empty()) runs = joined(std::move(runs), selected, made);
   const std::uint64_t budget = std::min(state_.memory.left() / 3, state_.info.max_allocation);
   std::vector<Part> parts;
   for (const std::vector<std::uint8_t>& run : runs) {
@@ -162,7 +191,7 @@ std::vector<VerifyField::Part> VerifyField::parts_of(const std::vector<std::uint
       for (;; end = y + (end - y + 1) / 2) {
         part.selected = layers_of(run, n, 1, y, end);
         if (BoxOfBricks(n, part.selected).bricks == 0) break;
-        part.nodes = nodes_of(part.selected, rates, rows);
+        part.nodes = nodes_of(part.selected, rates, rows, made);
         if (end == y + 1 || nodes_.bytes_of(part.nodes) <= budget) break;
       }
       y = end;

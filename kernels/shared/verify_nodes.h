@@ -31,8 +31,10 @@ typedef struct {
 typedef struct {
   int outer, inner;   // what lies outside and inside of the axis; inner in vectors of 16
   int before, after;  // nodes along the axis
-  int factor;         // places to a node
-  int node, phase;    // the first place lies behind that node by phase / factor
+  int factor, by;     // values lie by / factor of a node apart
+  int points;         // of a polynomial
+  int axis;           // 0: x, 1: y
+  int blocks;         // that `outer` counts, or rows of so many
 } VdvrVerifyBetween;
 
 #endif

@@ -32,13 +32,13 @@ Grid grid_of(const Index3& cells, const Vec3& spacing) {
 /// Nodes around a box of the grid, as many as gold of these rates needs.
 VerifyNodes::Part part_of(const VerifyNodes::Part& shape, const Index3& first, const Index3& end, int rate) {
   VerifyNodes::Part p = shape;
-  const std::int64_t around = rate > p.across ? VerifyNodes::reach : 2;
+  const std::int64_t around = rate > p.across ? VerifyNodes::Part{}.reach() : 2;
   p.first_x = first[0] * p.across - around;
   p.first_y = first[1] * p.across - around;
   p.nx = (end[0] - first[0]) * p.across + 1 + 2 * around;
   p.ny = (end[1] - first[1]) * p.across + 1 + 2 * around;
   if (!p.rows) {
-    const std::int64_t beyond = rate > p.along ? VerifyNodes::reach : 2;
+    const std::int64_t beyond = rate > p.along ? VerifyNodes::Part{}.reach() : 2;
     p.first_z = first[2] * p.along - beyond;
     p.nz = (end[2] - first[2]) * p.along + 1 + 2 * beyond;
   }
@@ -94,7 +94,7 @@ FieldBounds bounds_of(const ExactField& exact, const VerifyNodes& nodes, const V
 /// interpolation between them, a view's sum, the product along z; twelve weights along each axis that has
 /// fewer nodes than gold, and what these err.
 double counted(const NodePath& p) {
-  const bool across = p.across > 1, along = !p.rows && p.along > 1;
+  const bool across = p.across.made(), along = !p.rows && p.along.made();
   const double L = across ? 1.624 : 1, along_z = along ? 1.624 : 1, d = std::numbers::pi / p.density,
                column = (4 * p.reach + 6) * d + 27, row = 28 + 1.01 * static_cast<double>(10 + p.calls),
                product = p.rows || along ? 1.01 * 20 : 0;

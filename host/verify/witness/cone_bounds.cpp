@@ -161,18 +161,21 @@ struct NodeSums {
 // |f'|^2 <= 2 sup |f| sup |f''| on a line (Landau), and Bernstein.
 double slope(double value, double second) { return std::min(pi * value, std::sqrt(2 * value * second)); }
 
-// Twelve points of Lagrange along an axis, `factor` places to a node: the twelfth derivative (at j
-// derivatives of q along X, (12 choose j) 13! / (j + 1)! times (pi (|X_u| + |X_v|))^j) times what the product
-// of the distances to the points is at most.
-double lagrange_share(const ViewOnBox& v, const Sups& sups, std::size_t axis, int factor) {
-  const double band = factor * pi * (v.across_u[axis] + (sups.varies_along_v() ? v.across_v[axis] : 0.0)),
-               growth = factor * v.growth[axis];
-  constexpr auto n = static_cast<std::size_t>(lagrange_points);
-  double sum = 0;
-  for (std::size_t j = 0; j <= n; ++j)
-    sum += factorial(n) / (factorial(j) * factorial(n - j)) * factorial(n + 1) / factorial(j + 1) *
-           std::pow(growth, static_cast<double>(n - j)) * std::pow(band, static_cast<double>(j));
-  return lagrange_error(1) * sum;
+// n points of Lagrange along an axis: the n-th derivative (at j derivatives of q along X, (n choose j) (n +
+// 1)! / (j + 1)! times (pi (|X_u| + |X_v|))^j) times what the product of the distances to the points is at
+// most.
+double lagrange_share(const ViewOnBox& v, const Sups& sups, std::size_t axis, const BetweenNodes& between) {
+  const double steps = between.values_to_a_node(),
+               band = steps * pi * (v.across_u[axis] + (sups.varies_along_v() ? v.across_v[axis] : 0.0)),
+               growth = steps * v.growth[axis];
+  // By Horner's scheme from j = n down, each coefficient of the one before.
+  const int n = between.points;
+  double coefficient = 1, sum = 1;
+  for (int j = n; j > 0; --j) {
+    coefficient *= growth * j * (j + 1) / (n - j + 1);
+    sum = sum * band + coefficient;
+  }
+  return lagrange_error(1, between.points) * sum;
 }
 
 void add_nodes(NodeSums& out, const ViewOnBox& v, const Sups& sups, const ConePath& path) {
@@ -187,8 +190,8 @@ void add_nodes(NodeSums& out, const ViewOnBox& v, const Sups& sups, const ConePa
                             slope(sups.value, sups.second_v) * path.nodes.place_v);
   out.between += v.weight * (along_u * sups.second_u + sum_of_weights * along_v * sups.second_v);
   for (std::size_t e = 0; e < 3; ++e) {
-    const int factor = e < 2 ? path.path.across : path.path.along;
-    if (factor > 1) out.along[e] += v.weight * sups.value * lagrange_share(v, sups, e, factor);
+    const BetweenNodes& between = e < 2 ? path.path.across : path.path.along;
+    if (between.made()) out.along[e] += v.weight * sups.value * lagrange_share(v, sups, e, between);
   }
 }
 
@@ -199,18 +202,14 @@ void add_kinds(FieldBounds& b, const NodeSums& S, const ConePath& p) {
                    38 + 10 * p.nodes.cancellation + static_cast<double>(p.nodes.together + p.nodes.calls),
                node = S.places + S.between + weights * 1.01 * half_ulp * roundings * S.value +
                       weights * S.weight * p.host_rounding;
-  const LagrangeFilter across = lagrange_filter(p.path.across), along = lagrange_filter(p.path.along);
   const AxisNorms each;
-  add_errors(b, {node, {across.norms, across.norms, along.norms}});
+  add_errors(b, {node, {p.across, p.across, p.along}});
   const double row_runs = static_cast<double>((p.path.terms + rows_per_run - 1) / rows_per_run),
                product = 1.01 * half_ulp *
                          (static_cast<double>(rows_per_run + 3) + 1.01 * row_runs * row_runs * half_ulp);
-  if (p.path.along > 1)
-    add_errors(b, {along.norms.value * product * S.value, {across.norms, across.norms, each}});
+  if (p.path.along.made()) add_errors(b, {p.along.value * product * S.value, {p.across, p.across, each}});
   // Along z first, then y, then x: what comes later passes on what went wrong before.
-  const double L = across.norms.value,
-               passes =
-                   p.path.across > 1 ? 1.01 * half_ulp * (lagrange_points + 1) * (L * L + L) * S.value : 0,
+  const double L = p.across.value, passes = rounding_of_passes(p.path.across, L) * S.value,
                between = S.along[0] + L * S.along[1] + L * L * S.along[2];
   add_errors(b, {between + passes, {each, each, each}});
 }
@@ -222,6 +221,13 @@ SupsByView cone_view_sups(const ExactField& field, const Progress& progress) {
   pixels.pitch_u = pixels.pitch_v = 1;
   return view_sups(field.coefficients(), pixels, progress);
 }
+
+ConePath::ConePath(const NodePath& from, const ConeNodeFacts& facts, double rounding)
+    : path(from),
+      nodes(facts),
+      host_rounding(rounding),
+      across(lagrange_filter(path.across).norms),
+      along(lagrange_filter(path.along).norms) {}
 
 FieldBounds cone_field_bounds(std::span<const ViewMatrix> views, const SupsByView& sups, const ConeBox& box,
                               const Vec3& h, const ConePath& path, bool corrected) {

@@ -20,13 +20,17 @@ struct ConeBox {
 
 /// What errors of gold depend on: the path from nodes, and these themselves.
 struct ConePath {
+  /// `host_rounding`: of the table's double-precision values, weights of lambda not included.
+  ConePath(const NodePath& from, const ConeNodeFacts& facts, double host_rounding);
   NodePath path;
   ConeNodeFacts nodes;
-  double host_rounding = 0;  ///< of the table's double-precision values, weights of lambda not included
+  double host_rounding = 0;
+  AxisNorms across, along;  ///< of errors of nodes
 };
 
 /// Bounds on gold that reads nodes in the box only. `corrected`: whether second derivatives are taken to
-/// fourth order in h. Infinite where the box reaches a source's plane. Cost: some 3,000 operations a view.
+/// fourth order in h. Throws InputError where the box reaches a source's plane. Cost: some 3,000 operations a
+/// view.
 FieldBounds cone_field_bounds(std::span<const ViewMatrix> views, const SupsByView& sups, const ConeBox& box,
                               const Vec3& gold_spacing, const ConePath& path, bool corrected);
 

@@ -62,8 +62,10 @@ double band_at(const ViewMatrix& m, const Vec3& point, std::size_t axis, bool ro
 
 }  // namespace
 
-// Bounds do not rest on this: they follow from the spacing that is chosen.
-ConeNodeRates cone_node_rates(const ExactField& field, const Coverage& coverage, const Vec3& spacing) {
+namespace {
+
+/// At the covered region's rim, radians that the fastest wave of any view turns by from cell to cell.
+Vec3 fastest_wave(const ExactField& field, const Coverage& coverage, const Vec3& spacing) {
   constexpr int directions = 64;
   Vec3 band{};
   for (int d = 0; d < directions; ++d)
@@ -74,16 +76,34 @@ ConeNodeRates cone_node_rates(const ExactField& field, const Coverage& coverage,
           band[a] = std::max(
               band[a], band_at(m, {r * std::cos(phi), r * std::sin(phi), z}, a, field.geometry().rows > 1));
     }
+  for (std::size_t a = 0; a < 3; ++a) band[a] *= spacing[a];
+  return band;
+}
+
+}  // namespace
+
+// Bounds do not rest on these: they follow from the spacing that is chosen.
+ConeNodeRates cone_node_rates(const ExactField& field, const Coverage& coverage, const Vec3& spacing) {
+  const Vec3 wave = fastest_wave(field, coverage, spacing);
   const auto rate = [](double radians) {
     int n = 1;
     while (n < (1 << 24) && !(radians / n <= pi / 4)) n *= 2;
     return n;
   };
-  return {rate(std::max(band[0] * spacing[0], band[1] * spacing[1])), rate(band[2] * spacing[2])};
+  return {rate(std::max(wave[0], wave[1])), rate(wave[2])};
+}
+
+ConeNodeRates sparse_node_rates(const ExactField& field, const Coverage& coverage, const Vec3& spacing) {
+  constexpr double most_radians = 1.4;
+  const Vec3 wave = fastest_wave(field, coverage, spacing);
+  const auto rate = [](double radians) {
+    return static_cast<int>(std::clamp(std::ceil(radians / most_radians), 1.0, double{1 << 24}));
+  };
+  return {rate(std::max(wave[0], wave[1])), rate(wave[2])};
 }
 
 VerifyConeNodes::VerifyConeNodes(opencl::State& state, const ExactField& field, const Coverage& coverage,
-                                 double unit, double furthest)
+                                 double unit)
     : state_(state),
       field_(field),
       coverage_(coverage),
@@ -91,7 +111,6 @@ VerifyConeNodes::VerifyConeNodes(opencl::State& state, const ExactField& field, 
       density_{static_cast<double>(along_u_.places()) / static_cast<double>(field.geometry().columns),
                static_cast<double>(cone_density)},
       unit_(unit),
-      furthest_(furthest),
       upright_(std::all_of(field.views().begin(), field.views().end(),
                            [](const ViewMatrix& m) { return m[0][2] == 0 && m[2][2] == 0; })) {}
 
@@ -234,7 +253,7 @@ ConeNodeFacts VerifyConeNodes::make(const Nodes& wanted, const opencl::DeviceArr
     const auto& t = wanted.tiles[i];
     const double x = wanted.first[0] + static_cast<double>(t[0]) * wanted.spacing[0] + 0.5 * side_x,
                  y = wanted.first[1] + static_cast<double>(t[1]) * wanted.spacing[1] + 0.5 * side_y;
-    if (coverage_.margin(x, y) < -furthest_ - 0.5 * std::hypot(side_x, side_y)) continue;
+    if (coverage_.margin(x, y) < -wanted.furthest - 0.5 * std::hypot(side_x, side_y)) continue;
     tiles.first.push_back({{to_int(t[0]), to_int(t[1])}});
     tiles.slots.push_back(to_int(static_cast<std::int64_t>(i)));
     constexpr std::array<std::uint8_t, 4> whole{0, tile_nodes - 1, 0, tile_nodes - 1};

@@ -26,6 +26,11 @@ struct ConeNodeRates {
 };
 ConeNodeRates cone_node_rates(const ExactField& field, const Coverage& coverage, const Vec3& spacing);
 
+/// So many that polynomials of `sparse_points` determine F between them about as well as those of twelve
+/// points between the others, any numbers.
+constexpr int sparse_points = 32;
+ConeNodeRates sparse_node_rates(const ExactField& field, const Coverage& coverage, const Vec3& spacing);
+
 /// What the errors of nodes depend on (cone_bounds.hpp).
 struct ConeNodeFacts {
   double density_u = cone_density;  ///< values of the table to a pixel along u
@@ -37,16 +42,15 @@ struct ConeNodeFacts {
 
 class VerifyConeNodes {
  public:
-  /// Refers to the field and the coverage. Values are in `unit`. `furthest`: how far beyond the covered
-  /// region, across z, a node may lie that is used.
-  VerifyConeNodes(opencl::State& state, const ExactField& field, const Coverage& coverage, double unit,
-                  double furthest);
+  /// Refers to the field and the coverage. Values are in `unit`.
+  VerifyConeNodes(opencl::State& state, const ExactField& field, const Coverage& coverage, double unit);
 
   /// Nodes [tile][y][x][heights] in tiles of VDVR_VERIFY_TILE columns a side.
   struct Nodes {
     Vec3 first{}, spacing{};                         ///< where the first lies, and how far apart they are
     std::int64_t heights = 0;                        ///< of a node, to a multiple of 16
     std::int64_t used = 0;                           ///< of the heights
+    double furthest = 0;                             ///< beyond the covered region, across z, that is used
     std::vector<std::array<std::int64_t, 2>> tiles;  ///< wanted, by their first nodes x, y
     std::vector<std::uint8_t> blocks;                ///< [tile][heights / 16]: 0: not wanted; all where empty
     /// [tile]: in it the first and last x, then y, that are wanted; all where empty.
@@ -71,7 +75,7 @@ class VerifyConeNodes {
   const Coverage& coverage_;
   CosineTransform along_u_;
   std::array<double, 2> density_;  // of the table along u and v, places to a pixel
-  double unit_, furthest_;
+  double unit_;
   bool upright_;
 };
 

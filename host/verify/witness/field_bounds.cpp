@@ -101,20 +101,23 @@ std::vector<KindOfError> error_kinds(const Sums& S, double host_rounding, const 
     kinds.push_back({path.gain * product * S.value, {across, across, each}});
   } else {
     kinds.push_back({column + row, {across, across, along.norms}});
-    if (path.along > 1) kinds.push_back({along.norms.value * product * S.value, {across, across, each}});
+    if (path.along.made()) kinds.push_back({along.norms.value * product * S.value, {across, across, each}});
   }
   double interpolation = 1;
   for (std::size_t a = 0; a < 3; ++a) {
-    const bool made = a < 2 ? path.across > 1 : !path.rows && path.along > 1;
-    if (made) interpolation *= 1 + lagrange_error(path.band[a]);
+    const BetweenNodes& made = a < 2 ? path.across : path.along;
+    if (made.made() && (a < 2 || !path.rows)) interpolation *= 1 + lagrange_error(path.band[a], made.points);
   }
-  const double L = filter.norms.value,
-               passes = path.across > 1 ? 1.01 * half_ulp * (lagrange_points + 1) * (L * L + L) * S.value : 0;
+  const double L = filter.norms.value, passes = rounding_of_passes(path.across, L) * S.value;
   kinds.push_back({(interpolation - 1) * S.value + passes, {each, each, each}});
   return kinds;
 }
 
 }  // namespace
+
+double rounding_of_passes(const BetweenNodes& across, double norm) {
+  return across.made() ? 1.01 * half_ulp * (across.points + 1) * (norm * norm + norm) : 0;
+}
 
 void add_errors(FieldBounds& b, const KindOfError& kind) {
   const auto product = [&](const std::array<double, 3>& f) { return kind.size * f[0] * f[1] * f[2]; };

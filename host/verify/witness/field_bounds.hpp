@@ -32,9 +32,9 @@ SupsByView view_sups(std::span<const double> coefficients, const ParallelGeometr
 
 /// How F is computed at nodes of gold (nodes.hpp).
 struct NodePath {
-  int across = 1;    ///< places of gold to a back-projected node, across z
-  bool rows = true;  ///< nodes lie at the detector's rows; else at heights, `along` places to each
-  int along = 1;     ///< of heights
+  BetweenNodes across;            ///< gold among back-projected nodes, across z
+  bool rows = true;               ///< nodes lie at the detector's rows; else at heights
+  BetweenNodes along;             ///< gold among heights
   double density = fine_columns;  ///< fine columns to a detector column
   Vec3 band{0, 0, 0};             ///< of F at back-projected nodes, radians a node; z: at heights
   std::int64_t terms = 1;         ///< of the product along z
@@ -58,6 +58,10 @@ struct FieldBounds {
 /// `host_rounding`: what the table's double-precision values err.
 FieldBounds field_bounds(const SupsByView& sups, double host_rounding, const ParallelGeometry& geometry,
                          const Vec3& gold_spacing, const NodePath& path);
+
+/// What the two passes across z round, over the sum of sups of the views: each of a polynomial's weights and
+/// sums, once along y, which the pass along x passes on. `norm`: that of a value.
+double rounding_of_passes(const BetweenNodes& across, double norm);
 
 /// Errors of one kind: of nodes from which gold is made, or of gold. Axes x, y, z.
 struct KindOfError {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <numeric>
 #include <utility>
 
 #include "host/base/system/casts.hpp"
@@ -13,12 +14,10 @@ namespace vdvr {
 namespace {
 
 using std::numbers::pi;
-constexpr int first_node = 1 - lagrange_points / 2;  // from the node on the left of the place
-
-double lagrange_weight(double at, int i) {
+double lagrange_weight(const BetweenNodes& b, double at, int i) {
   double w = 1;
-  for (int j = 0; j < lagrange_points; ++j)
-    if (j != i) w *= (at - static_cast<double>(first_node + j)) / static_cast<double>(i - j);
+  for (int j = 0; j < b.points; ++j)
+    if (j != i) w *= (at - static_cast<double>(j - b.before())) / static_cast<double>(i - j);
   return w;
 }
 
@@ -26,10 +25,11 @@ double lagrange_weight(double at, int i) {
 double norm_of(const LagrangeFilter& f, int phase, const std::vector<std::pair<int, double>>& formula) {
   std::map<int, double> nodes;
   for (const auto& [offset, factor] : formula) {
-    const int place = phase + offset + 4 * f.factor, node = place / f.factor, at_phase = place % f.factor;
-    for (int i = 0; i < lagrange_points; ++i)
-      nodes[node + i] +=
-          factor * static_cast<double>(f.weights[at(std::int64_t{at_phase} * lagrange_points + i)]);
+    const BetweenNodes& b = f.between;
+    const int place = phase + (offset + 4 * b.factor) * b.by, node = place / b.factor,
+              at_phase = place % b.factor;
+    for (int i = 0; i < b.points; ++i)
+      nodes[node + i] += factor * static_cast<double>(f.weights[at(std::int64_t{at_phase} * b.points + i)]);
   }
   double sum = 0;
   for (const auto& [node, weight] : nodes) sum += std::abs(weight);
@@ -46,15 +46,20 @@ double dirichlet(double t, double V) {
 
 }  // namespace
 
-LagrangeFilter lagrange_filter(int factor) {
+BetweenNodes between_nodes(int rate, int nodes, int points) {
+  const int common = std::gcd(rate, nodes);
+  return {rate / common, nodes / common, points};
+}
+
+LagrangeFilter lagrange_filter(const BetweenNodes& b) {
   LagrangeFilter f;
-  f.factor = factor;
-  for (int phase = 0; phase < factor; ++phase)
-    for (int i = 0; i < lagrange_points; ++i)
-      f.weights.push_back(static_cast<float>(lagrange_weight(static_cast<double>(phase) / factor, i)));
-  if (factor == 1) return f;
+  f.between = b;
+  for (int phase = 0; phase < b.factor; ++phase)
+    for (int i = 0; i < b.points; ++i)
+      f.weights.push_back(static_cast<float>(lagrange_weight(b, static_cast<double>(phase) / b.factor, i)));
+  if (!b.made()) return f;
   f.norms = {1, 0, 0, 0};
-  for (int phase = 0; phase < factor; ++phase) {
+  for (int phase = 0; phase < b.factor; ++phase) {
     const auto raise = [&](double& norm, const std::vector<std::pair<int, double>>& formula) {
       norm = std::max(norm, (1 + 1e-12) * norm_of(f, phase, formula));
     };
@@ -68,12 +73,12 @@ LagrangeFilter lagrange_filter(int factor) {
   return f;
 }
 
-double lagrange_error(double band) {
-  // The product of the distances to the nodes is largest in the middle; the twelfth derivative is at most
-  // band^12 sup |f| (Bernstein).
+double lagrange_error(double band, int points) {
+  // The product of the distances to the n nodes is largest in the middle; the n-th derivative is at most
+  // band^n sup |f| (Bernstein).
   double bound = 1;
-  for (int i = 0; i < lagrange_points; ++i)
-    bound *= band * std::abs(0.5 - static_cast<double>(first_node + i)) / static_cast<double>(i + 1);
+  for (int i = 0; i < points; ++i)
+    bound *= band * std::abs(static_cast<double>(2 * i + 1 - points)) / static_cast<double>(2 * (i + 1));
   return bound * (1 + 1e-12);
 }
 

@@ -16,7 +16,7 @@
 namespace vdvr {
 
 static_assert(sizeof(VdvrVerifyRows) == 32 && sizeof(VdvrVerifyHeights) == 28 &&
-              sizeof(VdvrVerifyBetween) == 28);
+              sizeof(VdvrVerifyBetween) == 36);
 static_assert(VDVR_VERIFY_VIEWS == views_per_run && VDVR_VERIFY_ROWS == rows_per_run);
 
 namespace {
@@ -25,7 +25,6 @@ using std::numbers::pi;
 constexpr std::int64_t row_lanes = 16;           // of a vector along z
 constexpr std::int64_t tile = VDVR_VERIFY_TILE;  // nodes of its side
 constexpr std::int64_t beyond = 64;              // floats after a buffer's end that vectors may touch
-constexpr std::int64_t before = 5;               // nodes that a polynomial takes before the place
 
 std::int64_t up(std::int64_t n, std::int64_t multiple) { return (n + multiple - 1) / multiple * multiple; }
 
@@ -33,9 +32,9 @@ std::int64_t floor_of(std::int64_t n, std::int64_t by) { return n >= 0 ? n / by 
 
 std::int64_t rows_of(const VerifyNodes::Part& part, std::int64_t rows) { return part.rows ? rows : part.nz; }
 
-/// Nodes of a block's side from which so many of a lattice `factor` times as dense are made.
-std::int64_t nodes_before(std::int64_t after, std::int64_t factor) {
-  return factor == 1 ? after : (after - 3 + factor) / factor + lagrange_points;
+/// Nodes of a block's side from which so many values between them are made, wherever the first lies.
+std::int64_t nodes_before(std::int64_t after, const BetweenNodes& b) {
+  return b.made() ? ((after - 1) * b.by + b.factor - 1) / b.factor + b.points : after;
 }
 
 }  // namespace
@@ -61,9 +60,9 @@ VerifyNodes::VerifyNodes(opencl::State& state, const ExactField& field, const Gr
 }
 
 VerifyNodes::VerifyNodes(opencl::State& state, const ExactField& field, const Coverage& coverage,
-                         const Grid& grid, double unit, double furthest)
+                         const Grid& grid, double unit)
     : state_(state), field_(field), grid_(grid), unit_(unit), along_u_(1, 1), density_(fine_columns) {
-  cone_.emplace(state, field, coverage, unit, furthest);
+  cone_.emplace(state, field, coverage, unit);
 }
 
 std::uint64_t VerifyNodes::bytes_of(const Part& part) const {
@@ -220,6 +219,7 @@ void VerifyNodes::make_cone_nodes(std::vector<std::array<std::int64_t, 2>> tiles
   }
   wanted.heights = rows_padded_;
   wanted.used = part_.nz;
+  wanted.furthest = part_.furthest;
   wanted.tiles = std::move(tiles);
   const std::int64_t blocks = part_.blocks_along();
   for (std::size_t t = 0; t < part_.tiles.size(); ++t) {
@@ -264,21 +264,19 @@ struct VerifyNodes::Heights {
 VerifyNodes::Heights VerifyNodes::heights_of(const Blocks& blocks) const {
   const ParallelGeometry& g = field_.geometry();
   const std::int64_t all = rows_of(part_, g.rows);
-  const auto factor = std::max<std::int64_t>(1, blocks.rate / part_.along),
-             stride = std::max<std::int64_t>(1, part_.along / blocks.rate);
-  const LagrangeFilter filter = lagrange_filter(to_int(factor));
+  const BetweenNodes b = between_nodes(blocks.rate, part_.along, part_.points);
+  const LagrangeFilter filter = lagrange_filter(b);
+  const std::int64_t before = b.made() ? b.before() : 0, after = b.made() ? b.points - before : 1;
   Heights h;
   for (std::int64_t first = 0; first < blocks.z_padded; first += row_lanes) {
     // Of heights: those around the group's. Places beyond the part's are nobody's.
     const auto node_of = [&](std::int64_t i) {
-      return floor_of((blocks.first_z + first + i) * stride, factor) - part_.first_z;
+      return floor_of((blocks.first_z + first + i) * b.by, b.factor) - part_.first_z;
     };
-    const std::int64_t around = factor > 1 ? before : 0,
-                       begin = part_.rows ? 0 : std::clamp<std::int64_t>(node_of(0) - around, 0, all - 1),
-                       end = part_.rows ? all
-                                        : std::clamp<std::int64_t>(
-                                              node_of(row_lanes - 1) + (factor > 1 ? before + 2 : 1),
-                                              begin + 1, all);
+    const std::int64_t begin = part_.rows ? 0 : std::clamp<std::int64_t>(node_of(0) - before, 0, all - 1),
+                       end = part_.rows
+                                 ? all
+                                 : std::clamp<std::int64_t>(node_of(row_lanes - 1) + after, begin + 1, all);
     h.bands.push_back({{to_int(begin), to_int(end - begin),
                         to_int(static_cast<std::int64_t>(h.weights.size()) / row_lanes), 0}});
     for (std::int64_t row = begin; row < end; ++row)
@@ -292,26 +290,36 @@ VerifyNodes::Heights VerifyNodes::heights_of(const Blocks& blocks) const {
           continue;
         }
         const std::int64_t tap = row - node_of(i) + before,
-                           phase = height * stride - floor_of(height * stride, factor) * factor;
-        h.weights.push_back(
-            tap >= 0 && tap < lagrange_points ? filter.weights[at(phase * lagrange_points + tap)] : 0.0f);
+                           phase = height * b.by - floor_of(height * b.by, b.factor) * b.factor;
+        const std::int64_t taps = b.made() ? b.points : 1;
+        h.weights.push_back(tap < 0 || tap >= taps ? 0.0f
+                            : b.made()             ? filter.weights[at(phase * b.points + tap)]
+                                                   : 1.0f);
       }
   }
   return h;
 }
 
-std::int64_t VerifyNodes::floats_per_block(int rate, std::int64_t nx, std::int64_t z_padded) const {
-  const std::int64_t factor = rate / part_.across, n = nodes_before(nx, factor);
-  return factor == 1 ? 0 : (n + nx) * n * z_padded;
+std::int64_t VerifyNodes::floats_per_block(const Part& part, int rate, std::int64_t nx,
+                                           std::int64_t z_padded) const {
+  const BetweenNodes b = between_nodes(rate, part.across, part.points);
+  const std::int64_t n = nodes_before(nx, b);
+  return b.made() ? (n + nx) * n * z_padded : 0;
 }
 
 void VerifyNodes::gold(const Blocks& b, const opencl::DeviceArray<float>& values) {
-  const std::int64_t factor = b.rate / part_.across, n = nodes_before(b.nx, factor),
+  const BetweenNodes across = between_nodes(b.rate, part_.across, part_.points);
+  const std::int64_t n = nodes_before(b.nx, across), before = across.made() ? across.before() : 0,
                      blocks = static_cast<std::int64_t>(b.first.size()), groups = b.z_padded / row_lanes;
   std::vector<cl_int2> places;
-  for (const auto& first : b.first)
-    places.push_back({{to_int(floor_of(first[0], factor) - (factor > 1 ? before : 0) - part_.first_x),
-                       to_int(floor_of(first[1], factor) - (factor > 1 ? before : 0) - part_.first_y)}});
+  std::vector<cl_int> phases;  // [block][x, y]: how far the first value lies behind its node
+  for (const auto& first : b.first) {
+    const std::array<std::int64_t, 2> node{floor_of(first[0] * across.by, across.factor),
+                                           floor_of(first[1] * across.by, across.factor)};
+    places.push_back({{to_int(node[0] - before - part_.first_x), to_int(node[1] - before - part_.first_y)}});
+    for (std::size_t a = 0; a < 2; ++a)
+      phases.push_back(to_int(first[a] * across.by - node[a] * across.factor));
+  }
   const Heights h = heights_of(b);
   const opencl::DeviceArray<cl_int2> device_places(state_, std::span<const cl_int2>(places),
                                                    "blocks of gold to verify");
@@ -331,7 +339,7 @@ void VerifyNodes::gold(const Blocks& b, const opencl::DeviceArray<float>& values
   const opencl::Range heights =
       opencl::in_groups(state_.info, {in_group * count(groups), count((n + 7) / 8), count(n * blocks)},
                         {count(groups), count((n + 7) / 8), 1});
-  if (factor == 1) {
+  if (!across.made()) {
     along(heights, values.buffer(), nodes_->buffer(), weights.buffer(), bands.buffer(),
           device_places.buffer(), slots_->buffer(), shape);
     return;
@@ -341,35 +349,38 @@ void VerifyNodes::gold(const Blocks& b, const opencl::DeviceArray<float>& values
       second(state_, count(blocks * b.nx * n * b.z_padded + beyond), "rows of gold");
   along(heights, first.buffer(), nodes_->buffer(), weights.buffer(), bands.buffer(), device_places.buffer(),
         slots_->buffer(), shape);
-  const LagrangeFilter filter = lagrange_filter(to_int(factor));
+  const LagrangeFilter filter = lagrange_filter(across);
+  const opencl::DeviceArray<cl_int> device_phases(state_, std::span<const cl_int>(phases),
+                                                  "blocks of gold to verify");
   const opencl::DeviceArray<float> taps(state_, std::span<const float>(filter.weights), "Lagrange's weights");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrVerifyBetween> between(
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrVerifyBetween> kernel(
       state_, "verify/witness/verify_nodes", "verify_between", defines);
-  // Blocks begin two places before a node.
-  const auto pass = [&](const auto& out, const auto& in, std::int64_t outer, std::int64_t inner,
+  const auto pass = [&](const auto& out, const auto& in, int axis, std::int64_t outer, std::int64_t inner,
                         std::uint64_t together) {
     const VdvrVerifyBetween s{.outer = to_int(outer),
                               .inner = to_int(inner),
                               .before = to_int(n),
                               .after = to_int(b.nx),
-                              .factor = to_int(factor),
-                              .node = to_int(before),
-                              .phase = to_int(factor - 2)};
-    between(opencl::in_groups(state_.info, {in_group * count(inner), count(b.nx), count(outer)},
-                              {count(inner), together, 1}),
-            out.buffer(), in.buffer(), taps.buffer(), s);
+                              .factor = across.factor,
+                              .by = across.by,
+                              .points = across.points,
+                              .axis = axis,
+                              .blocks = to_int(blocks)};
+    kernel(opencl::in_groups(state_.info, {in_group * count(inner), count(b.nx), count(outer)},
+                             {count(inner), together, 1}),
+           out.buffer(), in.buffer(), taps.buffer(), device_phases.buffer(), s);
   };
-  pass(second, first, blocks, n * groups, 1);
-  pass(values, second, blocks * b.nx, groups, count(b.nx));
+  pass(second, first, 1, blocks, n * groups, 1);
+  pass(values, second, 0, blocks * b.nx, groups, count(b.nx));
 }
 
 NodePath VerifyNodes::path(const Part& part, int rate) const {
   const ParallelGeometry& g = field_.geometry();
   NodePath p;
-  p.across = rate / part.across;
+  p.across = between_nodes(rate, part.across, part.points);
   p.rows = part.rows;
-  p.along = std::max(1, rate / part.along);
-  p.terms = part.rows ? g.rows : row_lanes + lagrange_points;
+  if (!part.rows) p.along = between_nodes(rate, part.along, part.points);
+  p.terms = part.rows ? g.rows : row_lanes + part.points;
   p.gain = part.rows ? gain_ : 1;
   if (cone_) return p;
   p.calls = calls_;

@@ -3,6 +3,7 @@
 // does", step 1). Shares nothing with build. Launches kernels/verify/witness/verify_nodes.cl.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -28,6 +29,7 @@ class VerifyNodes {
   /// What is back-projected at once. Places count from the grid's first sample.
   struct Part {
     int across = 1;                                         ///< nodes to a cell of the grid, across z
+    int points = 12;                                        ///< of a polynomial between them
     std::int64_t first_x = 0, first_y = 0, nx = 0, ny = 0;  ///< nodes
     bool rows = true;                                       ///< along z: the detector's rows, or heights
     int along = 1;                                          ///< heights: to a cell of the grid
@@ -37,7 +39,10 @@ class VerifyNodes {
     std::vector<std::uint8_t> blocks;
     /// Of cone beam, of a wanted tile the first and last x, then y, that are wanted; all where empty.
     std::vector<std::array<std::uint8_t, 4>> ranges;
+    double furthest = HUGE_VAL;  ///< of cone beam: beyond the covered region across z no node is wanted
     [[nodiscard]] std::int64_t blocks_along() const { return (nz + 15) / 16; }
+    /// Nodes that an interpolated value needs beyond itself, to either side.
+    [[nodiscard]] std::int64_t reach() const { return points / 2 + 1; }
   };
   static std::int64_t tiles_across(std::int64_t nodes) {
     return (nodes + VDVR_VERIFY_TILE - 1) / VDVR_VERIFY_TILE;
@@ -47,20 +52,18 @@ class VerifyNodes {
 
   /// Blocks of gold, all with the same heights. Places count gold nodes from the grid's first sample.
   struct Blocks {
-    int rate = 1;                                        ///< a multiple of `across` by a power of two
+    /// That of the nodes, or such that none of its values that are wanted lies beyond them.
+    int rate = 1;
     std::span<const std::array<std::int64_t, 2>> first;  ///< first node x, y
     std::int64_t nx = 0;                                 ///< nodes of a block's side
     std::int64_t first_z = 0, z_padded = 0;              ///< heights, to a multiple of 16
   };
-  /// Nodes that an interpolated one needs beyond itself, to either side.
-  static constexpr std::int64_t reach = 7;
-
   /// `field` outlives this object. Values are in `unit`. `furthest`: how far beyond the covered region,
   /// across z, a node may lie that is used.
   VerifyNodes(opencl::State& state, const ExactField& field, const Grid& grid, double unit, double furthest);
   /// Of cone beam: parts are of heights. `coverage` outlives this object.
   VerifyNodes(opencl::State& state, const ExactField& field, const Coverage& coverage, const Grid& grid,
-              double unit, double furthest);
+              double unit);
   ~VerifyNodes();
   VerifyNodes(const VerifyNodes&) = delete;
   VerifyNodes& operator=(const VerifyNodes&) = delete;
@@ -75,7 +78,8 @@ class VerifyNodes {
   /// finite and mean nothing.
   void gold(const Blocks& blocks, const opencl::DeviceArray<float>& values);
   /// Floats that this takes a block, beside `values`.
-  [[nodiscard]] std::int64_t floats_per_block(int rate, std::int64_t nx, std::int64_t z_padded) const;
+  [[nodiscard]] std::int64_t floats_per_block(const Part& part, int rate, std::int64_t nx,
+                                              std::int64_t z_padded) const;
 
   /// How gold of that rate is made of this part's nodes, for its errors.
   [[nodiscard]] NodePath path(const Part& part, int rate) const;

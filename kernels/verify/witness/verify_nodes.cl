@@ -119,24 +119,24 @@ __kernel void verify_heights(__global float* gold, __global const float* nodes, 
 
 // --- across z ---
 
-// Along one axis of in[outer][before][inner]: out[outer][after][inner], `factor` places to a node.
-// weights[phase][12] are of the nodes -5 .. 6 around.
+// Along one axis of in[outer][before][inner]: out[outer][after][inner]. weights[phase][points] are of the
+// nodes around; phases[block][axis]: how far the first value lies behind the node in the middle of the first.
 __kernel void verify_between(__global float* out, __global const float* in, __global const float* weights,
-                             VdvrVerifyBetween s) {
+                             __global const int* phases, VdvrVerifyBetween s) {
   const int n = (int)get_global_id(0) * VDVR_LANES, i = n / 16, lane = n - i * 16,
             place = (int)get_global_id(1), o = (int)get_global_id(2);
   if (i >= s.inner || place >= s.after || o >= s.outer) return;
-  const int at = s.phase + place, behind = at / s.factor, node = s.node + behind,
-            phase = at - behind * s.factor;
+  const int at = phases[2 * (o / (s.outer / s.blocks)) + s.axis] + place * s.by, first = at / s.factor,
+            phase = at - first * s.factor, points = s.points;
   __global const float* from = in + ((size_t)o * s.before * s.inner + i) * 16 + lane;
   VEC v;
   if (phase == 0) {
-    v = READ(from + (size_t)node * s.inner * 16);
+    v = READ(from + (size_t)(first + points / 2 - 1) * s.inner * 16);
   } else {
-    __global const float* w = weights + phase * 12;
-    __global const float* p = from + (size_t)(node - 5) * s.inner * 16;
+    __global const float* w = weights + phase * points;
+    __global const float* p = from + (size_t)first * s.inner * 16;
     v = w[0] * READ(p);
-    for (int n = 1; n < 12; ++n) v = fma((VEC)(w[n]), READ(p + (size_t)n * s.inner * 16), v);
+    for (int n = 1; n < points; ++n) v = fma((VEC)(w[n]), READ(p + (size_t)n * s.inner * 16), v);
   }
   WRITE(v, out + (((size_t)o * s.after + place) * s.inner + i) * 16 + lane);
 }
