@@ -201,7 +201,7 @@ class TestedBricks {
 
   [[nodiscard]] bool serves(const Step& step, const std::vector<std::uint8_t>& wanted) const {
     // As far as F errs, a brick is not told from one that keeps its promise.
-    constexpr double most = 0.05;
+    constexpr double most = 0.06;
     return !step.by_sparse.empty() && std::find(wanted.begin(), wanted.end(), 1) != wanted.end() &&
            field_.sparse_nodes_serve(
                wanted, step.by_sparse, step.worth,

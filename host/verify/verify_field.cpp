@@ -193,10 +193,11 @@ bool VerifyField::sparse_nodes_serve(const std::vector<std::uint8_t>& selected, 
   if (!(sparse > 0 && sparse <= worth * nodes(rates.first(1), Made::dense))) return false;
   const Shape shape = shape_at(rates.front(), true, nodes_of(near, rates, false, Made::sparse));
   if (!far_from_sources(shape.nodes)) return false;
-  // What places err in blocks so large is known when nodes are made: some 45 to 75 units on scans tried. And
-  // some groups show what all err.
+  // What places err in blocks so large is known when nodes are made: about so many units on scans that were
+  // tried. And some groups show what all err.
   ConeNodeFacts facts;
-  facts.place_u = facts.place_v = 75 * half_ulp;
+  facts.place_u = 25 * half_ulp;
+  facts.place_v = 40 * half_ulp;
   facts.together = facts.calls = std::llround(std::sqrt(static_cast<double>(field_.views().size())));
   const std::vector<std::int64_t> all = groups_of(near);
   const std::size_t some = std::min<std::size_t>(64, all.size());

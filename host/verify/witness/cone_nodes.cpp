@@ -296,11 +296,12 @@ struct Place {
 };
 
 // (n0 + sum_e n_e d_e) / (l0 + sum_e l_e d_e) less its value m in the middle is sum_e (n_e - m l_e) d_e over
-// lambda. Numerator: five roundings of each term. Lambda: five, of terms `cancellation` as large as itself;
-// its reciprocal 2.5 units in the last place, the product one. Then the sum with what is left of the middle,
-// and half of a place less.
+// lambda. Numerator: four roundings of a term at most. Lambda: l0 once, its steps' terms three times at most,
+// two sums; with l0 and the steps' terms `cancellation` times lambda, the latter `growth`. Its reciprocal
+// once, after a step of Newton's. Then what is left of the middle, and the sum with it, up to twice the reach
+// and two places more.
 Place place_of(const ViewMatrix& m, std::size_t axis, const Vec3& seen, const Vec3& spacing,
-               double lambda_min, double cancellation, std::int64_t first, double density) {
+               double lambda_min, double cancellation, double growth, std::int64_t first, double density) {
   Place out;
   double reach = 0;
   for (std::size_t e = 0; e < 3; ++e) {
@@ -311,7 +312,7 @@ Place place_of(const ViewMatrix& m, std::size_t axis, const Vec3& seen, const Ve
   const double middle = table_place(axis, seen[axis], density), whole = std::floor(middle - reach) - 1;
   out.numbers.s[3] = static_cast<float>(middle - whole);
   out.whole = to_int(static_cast<std::int64_t>(whole) - first);
-  out.error = 1.01 * half_ulp * (reach * (14 + 5 * cancellation) + 5);
+  out.error = 1.01 * half_ulp * (reach * (10 + cancellation + 4 * growth) + 5);
   return out;
 }
 
@@ -329,8 +330,10 @@ ViewNumbers numbers_about(const ViewMatrix& m, const Vec3& middle, const Vec3& s
   }
   out.lambda.s[3] = static_cast<float>(seen[2]);
   const double least = seen[2] - growth, cancellation = (seen[2] + growth) / least;
-  const Place at_u = place_of(m, 0, seen, spacing, least, cancellation, first_column, density[0]),
-              at_v = place_of(m, 1, seen, spacing, least, cancellation, first_row, density[1]);
+  const Place at_u = place_of(m, 0, seen, spacing, least, cancellation, growth / least, first_column,
+                              density[0]),
+              at_v =
+                  place_of(m, 1, seen, spacing, least, cancellation, growth / least, first_row, density[1]);
   out.u = at_u.numbers;
   out.v = at_v.numbers;
   out.whole = {{at_u.whole, at_v.whole, 0, 0}};

@@ -44,6 +44,11 @@ static inline ALWAYS_INLINE float sum_of(float8 v) {
 #endif
 #define CLEAR(n) float8 sum##n = (float8)(0.0f);
 
+// 1 / lambda to a unit in the last place: what a quotient errs, some units, is squared by a step of Newton's.
+#define RECIPROCAL(TYPE, NAME, lambda)            \
+  TYPE NAME = 1.0f / (lambda);                    \
+  NAME = fma(NAME, fma(-(lambda), NAME, (TYPE)(1.0f)), NAME);
+
 #if VDVR_UPRIGHT
 // What does not change along z: the weights of eight columns, over lambda^2, 1 / lambda, and the first
 // column.
@@ -55,8 +60,9 @@ typedef struct {
 
 static inline ALWAYS_INLINE Across look_across(__global const View* view, float dx, float dy) {
   const float4 u = view->u, lambda = view->lambda;
-  const float inverse = 1.0f / (fma(lambda.x, dx, lambda.y * dy) + lambda.w),
-              place_u = fma(fma(u.x, dx, u.y * dy), inverse, u.w);
+  const float of = fma(lambda.x, dx, lambda.y * dy) + lambda.w;
+  RECIPROCAL(float, inverse, of)
+  const float place_u = fma(fma(u.x, dx, u.y * dy), inverse, u.w);
   const int below_u = (int)place_u;
   const float8 weight = (inverse * inverse) * lagrange(place_u - (float)below_u);
   const Across out = {weight, inverse, view->whole.x + below_u - 3};
@@ -214,8 +220,9 @@ __kernel void verify_cone(__global float* nodes, __global const float* table, __
       const float8 weight = a.weight;
 #else
       const float4 u = view->u, lambda = view->lambda;
-      const VEC inverse = 1.0f / fma((VEC)(lambda.z), dz, (VEC)(fma(lambda.x, dx, lambda.y * dy) + lambda.w)),
-                place_u = fma(fma((VEC)(u.z), dz, (VEC)(fma(u.x, dx, u.y * dy))), inverse, (VEC)(u.w));
+      const VEC of = fma((VEC)(lambda.z), dz, (VEC)(fma(lambda.x, dx, lambda.y * dy) + lambda.w));
+      RECIPROCAL(VEC, inverse, of)
+      const VEC place_u = fma(fma((VEC)(u.z), dz, (VEC)(fma(u.x, dx, u.y * dy))), inverse, (VEC)(u.w));
       const INT below_u = TO_INT(place_u), column = whole.x + below_u - 3;
       const VEC part_u = place_u - TO_VEC(below_u);
 #endif
