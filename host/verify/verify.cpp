@@ -127,7 +127,7 @@ class TestedBricks {
       return rest;
     };
     for (const Step& step : steps) {
-      if (step.rates.back() <= before) continue;
+      if (!step.by_sparse.empty() && step.rates.back() <= before) continue;
       const bool sparse = serves(step, wanted(step.by_sparse));
       const std::vector<int>& rates = sparse ? step.by_sparse : step.rates;
       const std::vector<std::uint8_t> rest = wanted(rates);

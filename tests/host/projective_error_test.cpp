@@ -7,6 +7,8 @@
 #include <boost/test/unit_test.hpp>
 #include <cmath>
 #include <complex>
+#include <random>
+#include <vector>
 
 #include "tests/support/tolerance.hpp"
 
@@ -65,6 +67,40 @@ BOOST_AUTO_TEST_CASE(no_wave_seen_in_perspective_exceeds_its_bound) {
                                << closest);
   }
   BOOST_TEST(closest > 0.3);
+}
+
+// As cone_tiles asks for it: most parts are passed over.
+BOOST_AUTO_TEST_CASE(the_largest_part_is_found_without_the_sums_of_all) {
+  std::mt19937 random(11);
+  const auto unit = [&] { return static_cast<double>(random()) / 4294967296.0; };
+  for (const Designed& d : designs) {
+    const double highest = std::min(d.band * 4 / 3, highest_gold_band);
+    const ProjectiveError error(design_gold_filter(d.rate, d.band, d.taps), highest);
+    for (int tries = 0; tries < 10; ++tries) {
+      std::vector<std::vector<ViewAtPart>> parts(100);
+      double largest = 0;
+      for (auto& part : parts) {
+        const double share = unit(), growth = 0.03 * unit();
+        for (int k = 0; k < 40; ++k) {
+          part.push_back(
+              {k % 7 == 0 ? 0.0 : unit(), highest * std::pow(unit(), 1 + share), growth * (2 * unit() - 1)});
+          // At the edges of what shares its constants, and where nothing grows.
+          if (k % 5 == 0)
+            part.back().band =
+                highest * static_cast<double>(1 + random() % ProjectiveError::bands) / ProjectiveError::bands;
+          if (k % 3 == 0) part.back().rho = 0;
+        }
+        double sum = 0;
+        for (const ViewAtPart& view : part) sum += view.weight * error.at(view.band, view.rho);
+        BOOST_TEST(sum == sum_of_errors(part, error), boost::test_tools::tolerance(1e-13));
+        BOOST_TEST(sum <= most_of_errors(part, error));
+        largest = std::max(largest, sum);
+      }
+      const double found = largest_of_errors(parts, error);
+      BOOST_TEST(largest <= found);
+      BOOST_TEST(found <= largest * (1 + 2e-12));
+    }
+  }
 }
 
 // The nearer the source, the larger; towards it as away from it.

@@ -406,49 +406,8 @@ ConeTiles::Known& ConeTiles::known(std::size_t axis, const GoldFilter& filter) {
 double ConeTiles::largest(std::size_t axis, const GoldFilter& filter) {
   Known& of_filter = known(axis, filter);
   std::optional<double>& found = of_filter.largest[axis];
-  if (!found) found = largest(axis, of_filter.error);
+  if (!found) found = largest_of_errors(at_parts_[axis], of_filter.error);
   return *found;
-}
-
-// At least the sum over a part's views: those whose bands have the same constants by the largest band and
-// growth among them. Errors that leave out what is negligible fall with neither by more than the 2^-44 that
-// `at` adds.
-double ConeTiles::most_of(const std::vector<ViewAtPart>& part, std::size_t axis,
-                          const ProjectiveError& error) const {
-  std::array<ViewAtPart, ProjectiveError::bands> alike{};
-  for (const ViewAtPart& view : part) {
-    ViewAtPart& most = alike[ProjectiveError::place_of(view.band, highest(axis))];
-    most = {most.weight + view.weight, std::max(most.band, view.band),
-            std::max(most.rho, std::abs(view.rho))};
-  }
-  double sum = 0;
-  for (const ViewAtPart& most : alike)
-    if (most.weight != 0) sum += most.weight * error.at(most.band, most.rho);
-  return sum * (1 + 1e-12);
-}
-
-// At least the largest sum over the views of what a filter errs along an axis. Most parts lie below it by
-// their bounds.
-double ConeTiles::largest(std::size_t axis, const ProjectiveError& error) const {
-  const auto& parts = at_parts_[axis];
-  std::vector<std::pair<double, std::size_t>> order(parts.size());
-  parallel_for(std::ssize(parts), {}, "", [&](std::int64_t i) {
-    order[at(i)] = {most_of(parts[at(i)], axis, error), at(i)};
-  });
-  std::ranges::sort(order, std::greater<>{});
-  double largest = 0;
-  constexpr std::int64_t together = 16;
-  for (std::int64_t first = 0; first < std::ssize(order) && order[at(first)].first > largest;
-       first += together) {
-    std::vector<double> sums(at(std::min(together, std::ssize(order) - first)), 0.0);
-    parallel_for(std::ssize(sums), {}, "", [&](std::int64_t i) {
-      for (const ViewAtPart& view : parts[order[at(first + i)].second])
-        if (view.weight != 0)
-          sums[at(i)] += view.weight * error.at(view.band, view.rho);  // 0, if of infinity
-    });
-    largest = std::max(largest, *std::ranges::max_element(sums));
-  }
-  return largest * (1 + 1e-12);
 }
 
 // At most what a filter errs along an axis: of some parts, as if no view grew, without views that

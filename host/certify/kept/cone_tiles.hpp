@@ -102,11 +102,6 @@ class ConeTiles {
     opencl::DeviceArray<float> values;
     std::int64_t first = 0, views = 0;
   };
-  // Of a view at the places of a part of the region: lambda^-2 sup |q|, and along an axis the band and rho of
-  // projective_error.hpp.
-  struct ViewAtPart {
-    double weight = 0, band = 0, rho = 0;
-  };
   void look_at_axis(std::size_t axis, const Coverage& coverage);
   void look_at_views(const Coverage& coverage);
   [[nodiscard]] std::int64_t views_together() const;
@@ -119,11 +114,8 @@ class ConeTiles {
     constexpr double least = 0.05;  // a single row does not vary along z
     return std::max(least, axis == 2 ? band_[2] : std::max(band_[0], band_[1]));
   }
-  [[nodiscard]] double largest(std::size_t axis, const ProjectiveError& error) const;
-  /// The same of a filter, found once.
+  /// The largest sum over the views of what a filter errs along an axis, found once.
   double largest(std::size_t axis, const GoldFilter& filter);
-  [[nodiscard]] double most_of(const std::vector<ViewAtPart>& part, std::size_t axis,
-                               const ProjectiveError& error) const;
   [[nodiscard]] double least_of(std::size_t axis, const ProjectiveError& error, double fewest) const;
   // What is known of a filter: by axis the largest sum over the views of what it errs.
   struct Known {

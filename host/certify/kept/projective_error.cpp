@@ -1,8 +1,10 @@
 #include "host/certify/kept/projective_error.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <span>
@@ -101,6 +103,46 @@ double ProjectiveError::at(double band, double rho) const {
   // At most 81 terms of at most 90 roundings each, whose sum is at most `all`; the exponent, at most 38, of
   // eight: fewer than 500 u of `all`.
   return all - less + all * 0x1p-44;
+}
+
+double sum_of_errors(std::span<const ViewAtPart> part, const ProjectiveError& error) {
+  double sum = 0;
+  for (const ViewAtPart& view : part)
+    if (view.weight != 0) sum += view.weight * error.at(view.band, view.rho);  // 0, if of infinity
+  return sum;
+}
+
+// Views whose bands have the same constants err by no more than the largest band and growth among them would.
+// Errors that leave out what is negligible fall with neither by more than the 2^-44 that `at` adds.
+double most_of_errors(std::span<const ViewAtPart> part, const ProjectiveError& error) {
+  std::array<ViewAtPart, bands> alike{};
+  for (const ViewAtPart& view : part) {
+    ViewAtPart& most = alike[ProjectiveError::place_of(view.band, error.highest())];
+    most = {most.weight + view.weight, std::max(most.band, view.band),
+            std::max(most.rho, std::abs(view.rho))};
+  }
+  return sum_of_errors(alike, error) * (1 + 1e-12);
+}
+
+// Most parts lie below the largest by their bounds.
+double largest_of_errors(std::span<const std::vector<ViewAtPart>> parts, const ProjectiveError& error) {
+  std::vector<std::pair<double, std::size_t>> order(parts.size());
+  parallel_for(std::ssize(parts), {}, "", [&](std::int64_t i) {
+    const auto part = static_cast<std::size_t>(i);
+    order[part] = {most_of_errors(parts[part], error), part};
+  });
+  std::ranges::sort(order, std::greater<>{});
+  double largest = 0;
+  constexpr std::size_t together = 16;
+  for (std::size_t first = 0; first < order.size() && order[first].first > largest; first += together) {
+    std::vector<double> sums(std::min(together, order.size() - first), 0.0);
+    parallel_for(std::ssize(sums), {}, "", [&](std::int64_t i) {
+      const auto n = static_cast<std::size_t>(i);
+      sums[n] = sum_of_errors(parts[order[first + n].second], error);
+    });
+    largest = std::max(largest, *std::ranges::max_element(sums));
+  }
+  return largest * (1 + 1e-12);
 }
 
 }  // namespace vdvr

@@ -32,10 +32,23 @@ class ProjectiveError {
   /// At least |filtered - f| / (lambda^-2 sup |g|), at any phase. Infinite where `band` exceeds the highest
   /// or lambda vanishes among the taps.
   [[nodiscard]] double at(double band, double rho) const;
+  [[nodiscard]] double highest() const { return highest_; }
 
  private:
   double highest_ = 0, reach_ = 0, norm_ = 0;
   std::vector<std::vector<double>> constants_;  // [band][moment]; none of a copy
 };
+
+/// Of a view at the places of a part of the covered region: lambda^-2 sup |q|, and band and rho there along
+/// an axis.
+struct ViewAtPart {
+  double weight = 0, band = 0, rho = 0;
+};
+/// The sum over a part's views of what a filter errs.
+double sum_of_errors(std::span<const ViewAtPart> part, const ProjectiveError& error);
+/// At least that, by one evaluation for each band of the constants.
+double most_of_errors(std::span<const ViewAtPart> part, const ProjectiveError& error);
+/// At least the largest sum of all parts. Cost: bounds of all, sums of those that they do not rule out.
+double largest_of_errors(std::span<const std::vector<ViewAtPart>> parts, const ProjectiveError& error);
 
 }  // namespace vdvr

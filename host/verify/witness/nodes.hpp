@@ -52,12 +52,12 @@ class VerifyNodes {
 
   /// Blocks of gold, all with the same heights. Places count gold nodes from the grid's first sample.
   struct Blocks {
-    /// That of the nodes, or such that none of its values that are wanted lies beyond them.
-    int rate = 1;
+    int rate = 1;                                        ///< any
     std::span<const std::array<std::int64_t, 2>> first;  ///< first node x, y
     std::int64_t nx = 0;                                 ///< nodes of a block's side
     std::int64_t first_z = 0, z_padded = 0;              ///< heights, to a multiple of 16
   };
+
   /// `field` outlives this object. Values are in `unit`. `furthest`: how far beyond the covered region,
   /// across z, a node may lie that is used.
   VerifyNodes(opencl::State& state, const ExactField& field, const Grid& grid, double unit, double furthest);
