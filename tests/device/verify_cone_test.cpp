@@ -359,6 +359,35 @@ BOOST_AUTO_TEST_CASE(no_point_exceeds_the_bound_of_its_brick) {
   }
 }
 
+// Of a brick by itself only its own nodes are made, and those around.
+BOOST_AUTO_TEST_CASE(sparse_nodes_of_a_brick_by_itself_serve_it) {
+  const ProjectionSet scan = noisy_cone(orbit(400), 4);
+  const ExactField exact(scan, {});
+  const Coverage coverage = certified_coverage(scan, {});
+  const MixedVolume volume = volume_of(exact, grid_of(coverage, 1), 8);
+  VerifyField field(support::device().state(), exact, volume, {}, {});
+  const Index3 n = volume.bricks();
+  for (const Index3& d : {Index3{0, 0, 0}, Index3{1, 0, 0}, Index3{0, 1, 0}, Index3{0, 0, 1}}) {
+    const auto brick = at(((n[2] / 2 - d[2]) * n[1] + n[1] / 2 - d[1]) * n[0] + n[0] / 2 - d[0]);
+    std::vector<std::uint8_t> selected(volume.level.size(), 0);
+    selected[brick] = 1;
+    const std::size_t before = field.seen().size();
+    field.look_at({brick}, 200, 3);
+    const std::array<int, 2> rates{4, 8};
+    field.run(
+        selected, rates, [](std::size_t, int) { return true; }, [](const VerifyField::Piece&) {}, {},
+        VerifyField::Made::sparse);
+    std::vector<Vec3> nodes;
+    for (std::size_t i = before; i < field.seen().size(); ++i) nodes.push_back(field.seen()[i].at);
+    BOOST_TEST(nodes.size() == 400);
+    const std::vector<double> F = exact.at(nodes);
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      const VerifyField::Node& node = field.seen()[before + i];
+      BOOST_TEST(std::abs(node.value - F[i]) <= tolerance::bound(node.arithmetic));
+    }
+  }
+}
+
 BOOST_AUTO_TEST_CASE(a_valid_certificate_holds) {
   const VerifyResult r = verified(built().result.volume, built().result.certificate);
   BOOST_TEST(r.holds, r.failure);
