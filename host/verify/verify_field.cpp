@@ -168,7 +168,7 @@ bool VerifyField::far_from_sources(const VerifyNodes::Part& part) const {
   for (std::size_t a = 0; a < 3; ++a) {
     const int nodes = a < 2 ? part.across : part.along;
     around[a] = grid.spacing[a] * (static_cast<double>(bricks_to_group(n[a]) * volume_.granularity) +
-                                   static_cast<double>(part.reach() + verify_halo + 16) / nodes);
+                                   static_cast<double>(part.reach() + verify_halo + 24) / nodes);
   }
   const double r = coverage_.inner_radius() + part.furthest + std::hypot(around[0], around[1]);
   const auto [low, high] = coverage_.heights();
@@ -183,15 +183,19 @@ bool VerifyField::sparse_nodes_serve(const std::vector<std::uint8_t>& selected, 
                                      double worth, double most) const {
   if (field_.views().empty() || sparse_rates_.across >= std::min(rates.front(), across_)) return false;
   const std::vector<std::uint8_t> near = near_coverage(selected);
-  const auto nodes = [&](std::span<const int> of, Made made) {
+  const auto nodes = [](const std::vector<Part>& parts) {
     double blocks = 0;
-    for (const Part& part : parts_of(near, of, made))
+    for (const Part& part : parts)
       blocks += static_cast<double>(std::count(part.nodes.blocks.begin(), part.nodes.blocks.end(), 1));
     return blocks;
   };
-  const double sparse = nodes(rates, Made::sparse);
-  if (!(sparse > 0 && sparse <= worth * nodes(rates.first(1), Made::dense))) return false;
-  const Shape shape = shape_at(rates.front(), true, nodes_of(near, rates, false, Made::sparse));
+  const std::vector<Part> sparse = parts_of(near, rates, Made::sparse);
+  if (sparse.empty() || std::any_of(sparse.begin(), sparse.end(), [&](const Part& part) {
+        return nodes_.bytes_of(part.nodes) > part_bytes();
+      }))
+    return false;
+  if (nodes(sparse) > worth * nodes(parts_of(near, rates.first(1), Made::dense))) return false;
+  const Shape shape = shape_at(rates.front(), true, sparse.front().nodes);
   if (!far_from_sources(shape.nodes)) return false;
   // What places err in blocks so large is known when nodes are made: about so many units on scans that were
   // tried. And some groups show what all err.
@@ -203,9 +207,13 @@ bool VerifyField::sparse_nodes_serve(const std::vector<std::uint8_t>& selected, 
   const std::size_t some = std::min<std::size_t>(64, all.size());
   std::vector<std::int64_t> groups;
   for (std::size_t i = 0; i < some; ++i) groups.push_back(all[i * all.size() / some]);
-  const auto bounds = bounds_of_groups(shape, facts, groups);
-  return std::all_of(bounds.begin(), bounds.end(),
-                     [&](const auto& of) { return of.second.arithmetic <= most; });
+  try {
+    const auto bounds = bounds_of_groups(shape, facts, groups);
+    return std::all_of(bounds.begin(), bounds.end(),
+                       [&](const auto& of) { return of.second.arithmetic <= most; });
+  } catch (const InputError&) {  // a box reaches a source's plane
+    return false;
+  }
 }
 
 const FieldBounds& VerifyField::bounds_of(const Shape& s, std::int64_t brick) const {

@@ -128,6 +128,8 @@ class VerifyField {
   [[nodiscard]] Shape shape_at(int rate, bool many, const VerifyNodes::Part& part) const;
   [[nodiscard]] ConeBox group_box(std::int64_t group, int rate, const VerifyNodes::Part& part) const;
   [[nodiscard]] std::int64_t group_of(std::int64_t brick) const;
+  /// What the nodes of a part may take of the device.
+  [[nodiscard]] std::uint64_t part_bytes() const;
   [[nodiscard]] bool far_from_sources(const VerifyNodes::Part& part) const;
   [[nodiscard]] std::vector<std::int64_t> groups_of(const std::vector<std::uint8_t>& selected) const;
   [[nodiscard]] std::map<std::int64_t, FieldBounds> bounds_of_groups(

@@ -60,6 +60,10 @@ int VerifyField::nodes_along(int most) const {
   return along;
 }
 
+std::uint64_t VerifyField::part_bytes() const {
+  return std::min(state_.memory.left() / 3, state_.info.max_allocation);
+}
+
 bool VerifyField::rows_serve(std::int64_t layers) const {
   if (!field_.views().empty()) return false;
   const std::int64_t of_layer = std::int64_t{volume_.granularity} * nodes_along(1 << 24) + 1 +
@@ -181,7 +185,6 @@ std::vector<VerifyField::Part> VerifyField::parts_of(const std::vector<std::uint
   const bool rows = field_.views().empty() && field_.geometry().rows <= heights;
   if (rows) runs.assign(1, selected);
   if (!field_.views().empty()) runs = joined(std::move(runs), selected, made);
-  const std::uint64_t budget = std::min(state_.memory.left() / 3, state_.info.max_allocation);
   std::vector<Part> parts;
   for (const std::vector<std::uint8_t>& run : runs) {
     const BoxOfBricks box(n, run);
@@ -192,7 +195,7 @@ std::vector<VerifyField::Part> VerifyField::parts_of(const std::vector<std::uint
         part.selected = layers_of(run, n, 1, y, end);
         if (BoxOfBricks(n, part.selected).bricks == 0) break;
         part.nodes = nodes_of(part.selected, rates, rows, made);
-        if (end == y + 1 || nodes_.bytes_of(part.nodes) <= budget) break;
+        if (end == y + 1 || nodes_.bytes_of(part.nodes) <= part_bytes()) break;
       }
       y = end;
       if (BoxOfBricks(n, part.selected).bricks > 0) parts.push_back(std::move(part));

@@ -60,10 +60,6 @@ double band_at(const ViewMatrix& m, const Vec3& point, std::size_t axis, bool ro
          seen[2];
 }
 
-}  // namespace
-
-namespace {
-
 /// At the covered region's rim, radians that the fastest wave of any view turns by from cell to cell.
 Vec3 fastest_wave(const ExactField& field, const Coverage& coverage, const Vec3& spacing) {
   constexpr int directions = 64;

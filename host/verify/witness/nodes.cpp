@@ -2,6 +2,8 @@
 // from there on.
 #include "host/verify/witness/nodes.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -12,6 +14,7 @@
 #include "host/base/system/parallel.hpp"
 #include "host/verify/witness/cosine_sums.hpp"
 #include "host/verify/witness/lagrange.hpp"
+#include "vdvr/error.hpp"
 
 namespace vdvr {
 
@@ -309,6 +312,9 @@ std::int64_t VerifyNodes::floats_per_block(const Part& part, int rate, std::int6
 
 void VerifyNodes::gold(const Blocks& b, const opencl::DeviceArray<float>& values) {
   const BetweenNodes across = between_nodes(b.rate, part_.across, part_.points);
+  if (!across.made() && across.by > 1)
+    throw InputError(
+        fmt::format("gold of rate {} is coarser than its {} nodes a cell", b.rate, part_.across));
   const std::int64_t n = nodes_before(b.nx, across), before = across.made() ? across.before() : 0,
                      blocks = static_cast<std::int64_t>(b.first.size()), groups = b.z_padded / row_lanes;
   std::vector<cl_int2> places;

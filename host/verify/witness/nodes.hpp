@@ -52,7 +52,7 @@ class VerifyNodes {
 
   /// Blocks of gold, all with the same heights. Places count gold nodes from the grid's first sample.
   struct Blocks {
-    int rate = 1;                                        ///< any
+    int rate = 1;                                        ///< not a divisor of `across` below it
     std::span<const std::array<std::int64_t, 2>> first;  ///< first node x, y
     std::int64_t nx = 0;                                 ///< nodes of a block's side
     std::int64_t first_z = 0, z_padded = 0;              ///< heights, to a multiple of 16

@@ -1,5 +1,5 @@
 // How `verify` makes F, apart from everything that build uses: back-projection of nodes by six points of
-// Lagrange in u, a product along z to the heights of gold, and twelve points of Lagrange across z
+// Lagrange in u, a product along z to the heights of gold, and twelve points of Lagrange, or more, across z
 // (docs/error-bounds.md, "What verify does", step 1).
 // Layouts: float table[view][fine column][16], 16 rows or heights; float nodes[wanted
 // tile][y][x][rows_padded]; int slots[tile y][tile x]: which wanted tile that is, 0 where it is none; float
