@@ -171,10 +171,9 @@ bool VerifyField::far_from_sources(const VerifyNodes::Part& part) const {
                                    static_cast<double>(part.reach() + verify_halo + 24) / nodes);
   }
   const double r = coverage_.inner_radius() + part.furthest + std::hypot(around[0], around[1]);
-  const auto [low, high] = coverage_.heights();
+  const double low = coverage_.heights().first - around[2], high = coverage_.heights().second + around[2];
   return std::all_of(field_.views().begin(), field_.views().end(), [&](const ViewMatrix& m) {
-    const double least = m[2][3] + std::min(m[2][2] * (low - around[2]), m[2][2] * (high + around[2])) -
-                         r * std::hypot(m[2][0], m[2][1]);
+    const double least = m[2][3] + std::min(m[2][2] * low, m[2][2] * high) - r * std::hypot(m[2][0], m[2][1]);
     return least >= 0.1 * m[2][3];
   });
 }
