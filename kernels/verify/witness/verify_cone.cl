@@ -45,8 +45,8 @@ static inline ALWAYS_INLINE float sum_of(float8 v) {
 #define CLEAR(n) float8 sum##n = (float8)(0.0f);
 
 // 1 / lambda to a unit in the last place: what a quotient errs, some units, is squared by a step of Newton's.
-#define RECIPROCAL(TYPE, NAME, lambda)            \
-  TYPE NAME = 1.0f / (lambda);                    \
+#define RECIPROCAL(TYPE, NAME, lambda) \
+  TYPE NAME = 1.0f / (lambda);         \
   NAME = fma(NAME, fma(-(lambda), NAME, (TYPE)(1.0f)), NAME);
 
 #if VDVR_UPRIGHT
