@@ -18,7 +18,7 @@
 #include "host/certify/choose_coarsening.hpp"
 #include "host/certify/choose_rates.hpp"
 #include "host/certify/forecaster.hpp"
-#include "host/certify/gold/base_of_gold.hpp"
+#include "host/certify/kept/base_of_gold.hpp"
 #include "host/certify/gold/gold_batch.hpp"
 #include "host/certify/gold/prepared_scan.hpp"
 #include "host/certify/plan_parts.hpp"

@@ -1,9 +1,10 @@
 // One work-item carries VDVR_LANES heights: the vector type VEC, INT of its comparisons, INDEX of its lanes,
 // TO_INT and TO_VEC, the same bits as BITS and OF_BITS, aligned loads and stores LOAD and STORE, others READ
-// and WRITE, the LARGEST of its lanes, LANE(v, n), one of them, and FOR_LANES(M), M(n) of each, n a
-// hexadecimal digit. Where a work-group shares a column or a brick, VDVR_ALONG work-items of it lie along z
-// (device/shared_column.h). Tuning; neither changes the result. With VDVR_DOUBLE 1 also a vector of sums in
-// double precision, made of samples by WIDE and rounded to samples by NARROW; without it sums are as samples.
+// and WRITE, and of private arrays READ_OWN and WRITE_OWN, the LARGEST of its lanes, LANE(v, n), one of them,
+// and FOR_LANES(M), M(n) of each, n a hexadecimal digit. Where a work-group shares a column or a brick,
+// VDVR_ALONG work-items of it lie along z (device/shared_column.h). Tuning; neither changes the result. With
+// VDVR_DOUBLE 1 also a vector of sums in double precision, made of samples by WIDE and rounded to samples by
+// NARROW; without it sums are as samples.
 #ifndef VDVR_LANES
 #define VDVR_LANES 16
 #endif
@@ -35,8 +36,8 @@
 #define OF_BITS(v) as_float4(v)
 #define LOAD(p) vload4(0, p)
 #define STORE(v, p) vstore4(v, 0, p)
-#define READ(p) vload4(0, p)
-#define WRITE(v, p) vstore4(v, 0, p)
+#define READ_OWN(p) vload4(0, p)
+#define WRITE_OWN(v, p) vstore4(v, 0, p)
 #define LARGEST(v) largest_of_4(v)
 #define FOR_LANES(M) M(0) M(1) M(2) M(3)
 #elif VDVR_LANES == 8
@@ -50,8 +51,8 @@
 #define OF_BITS(v) as_float8(v)
 #define LOAD(p) vload8(0, p)
 #define STORE(v, p) vstore8(v, 0, p)
-#define READ(p) vload8(0, p)
-#define WRITE(v, p) vstore8(v, 0, p)
+#define READ_OWN(p) vload8(0, p)
+#define WRITE_OWN(v, p) vstore8(v, 0, p)
 #define LARGEST(v) largest_of_8(v)
 #define FOR_LANES(M) M(0) M(1) M(2) M(3) M(4) M(5) M(6) M(7)
 #elif VDVR_LANES == 16
@@ -65,12 +66,20 @@
 #define OF_BITS(v) as_float16(v)
 #define LOAD(p) (*(__global const float16*)(p))
 #define STORE(v, p) (*(__global float16*)(p) = (v))
-#define READ(p) vload16(0, p)
-#define WRITE(v, p) vstore16(v, 0, p)
+#define READ_OWN(p) vload16(0, p)
+#define WRITE_OWN(v, p) vstore16(v, 0, p)
 #define LARGEST(v) largest_of_16(v)
 #define FOR_LANES(M) M(0) M(1) M(2) M(3) M(4) M(5) M(6) M(7) M(8) M(9) M(a) M(b) M(c) M(d) M(e) M(f)
 #else
 #error "VDVR_LANES must be 1, 4, 8 or 16"
+#endif
+
+#if VDVR_LANES > 1
+// Not by vload and vstore: PoCL makes these of loads of pairs, and where two of them overlap, as at the nodes
+// below and above, LLVM shares the pairs and adds them one by one, in place of whole vectors.
+typedef VEC __attribute__((aligned(4))) LOOSE;
+#define READ(p) (*(__global const LOOSE*)(p))
+#define WRITE(v, p) (*(__global LOOSE*)(p) = (v))
 #endif
 
 #define ALWAYS_INLINE __attribute__((always_inline))

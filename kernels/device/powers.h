@@ -1,5 +1,5 @@
 // Quotients by powers of two, as products by their exact inverses: OpenCL's own quotients may err by 2.5 ulp,
-// and some kernels take theirs for exact. Included by cell_test.cl, classify.cl, fit_coefficients.cl and
+// and some kernels take theirs for exact. Included by cell_test.cl, fit_tiles.cl and
 // verify_pieces.cl.
 #ifndef VDVR_POWERS_H
 #define VDVR_POWERS_H

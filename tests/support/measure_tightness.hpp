@@ -8,7 +8,7 @@
 #include <random>
 
 #include "host/base/system/casts.hpp"
-#include "host/certify/gold/base_of_gold.hpp"
+#include "host/certify/kept/base_of_gold.hpp"
 #include "host/certify/gold/gold_batch.hpp"
 #include "host/certify/gold/prepared_scan.hpp"
 #include "host/field/fbp/reconstruct.hpp"

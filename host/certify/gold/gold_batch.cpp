@@ -17,7 +17,7 @@
 
 namespace vdvr {
 
-static_assert(sizeof(VdvrGoldShape) == 48 && sizeof(VdvrLattice) == 36);
+static_assert(sizeof(VdvrGoldShape) == 48);
 
 namespace {
 
@@ -32,12 +32,12 @@ constexpr float eighth = 0.125f;
 
 // Mirrors TileRequest of kernels/certify/gold/classify.cl.
 struct GoldBatch::TileRequest {
-  cl_int block, node_x, node_y, node_z;
-  cl_int spacing_x, spacing_y, spacing_z;
+  cl_int block, node_x, node_y;
+  cl_int spacing_x, spacing_y;
   cl_int side_x, side_y, side_z;
   cl_int last_x, last_y, last_z;
-  cl_int pad;
-  cl_ulong offset;
+  cl_int step_x, step_y, step_z;
+  cl_ulong from, offset;
 };
 
 GoldBatch::~GoldBatch() { clFinish(state_.queue()); }
@@ -87,41 +87,32 @@ opencl::DeviceArray<cl_int4> GoldBatch::places(const std::vector<std::int64_t>& 
   return opencl::copied<cl_int4>(state_, out, "bricks to test");
 }
 
-const LevelSamples& GoldBatch::lattice(const LevelTriple& level, const std::vector<std::int64_t>& bricks) {
-  const std::int64_t side = std::int64_t{settings_.granularity} * settings_.rate;
-  std::vector<NodeBox> boxes;
-  for (const std::int64_t brick : bricks) {
-    const auto [b, x, y, z] = place(brick);
-    boxes.push_back({b, {x * side, y * side, z * side}, {(x + 1) * side, (y + 1) * side, (z + 1) * side}});
-  }
-  const int steps = !settings_.midrange             ? 0
-                    : level == LevelTriple{0, 0, 0} ? base_fit_steps
-                                                    : level_fit_steps;
-  return fit_(gold_, margin_, boxes, spacing_of(level), steps, of_curvature_ * settings_.curvature);
-}
-
 GoldBatch::TileRequest GoldBatch::request(std::int64_t brick, const Index3& spacing,
-                                          std::uint64_t offset) const {
+                                          const TileFit::Place& from, std::uint64_t offset) const {
   const std::int64_t g = settings_.granularity, rate = settings_.rate;
-  const auto side = [&](std::size_t a) { return to_int(g * rate / spacing[a] + 1); };
   const auto [b, x, y, z] = place(brick);
   const auto& first = first_brick_[at(b)];
-  TileRequest r{};
-  r.block = to_int(b);
-  r.node_x = to_int(x * g * rate);
-  r.node_y = to_int(y * g * rate);
-  r.node_z = to_int(z * g * rate);
-  r.spacing_x = to_int(spacing[0]);
-  r.spacing_y = to_int(spacing[1]);
-  r.spacing_z = to_int(spacing[2]);
-  r.side_x = side(0);
-  r.side_y = side(1);
-  r.side_z = side(2);
-  r.last_x = to_int(std::min(shape_.nx - 1, (settings_.grid.cells[0] - first[0] * g) * rate));
-  r.last_y = to_int(std::min(shape_.ny - 1, (settings_.grid.cells[1] - first[1] * g) * rate));
-  r.last_z = to_int(shape_.nz - 1);
-  r.offset = offset;
-  return r;
+  const Index3 node{x * side(), y * side(), z * side()},
+      last{std::min(shape_.nx - 1, (settings_.grid.cells[0] - first[0] * g) * rate),
+           std::min(shape_.ny - 1, (settings_.grid.cells[1] - first[1] * g) * rate), shape_.nz - 1};
+  const auto samples = [&](std::size_t a) { return to_int(side() / spacing[a] + 1); };
+  const auto last_sample = [&](std::size_t a) { return to_int((last[a] - node[a]) / spacing[a]); };
+  return {.block = to_int(b),
+          .node_x = to_int(node[0]),
+          .node_y = to_int(node[1]),
+          .spacing_x = to_int(spacing[0]),
+          .spacing_y = to_int(spacing[1]),
+          .side_x = samples(0),
+          .side_y = samples(1),
+          .side_z = samples(2),
+          .last_x = last_sample(0),
+          .last_y = last_sample(1),
+          .last_z = last_sample(2),
+          .step_x = to_int(from.step[0]),
+          .step_y = to_int(from.step[1]),
+          .step_z = to_int(from.step[2]),
+          .from = from.first,
+          .offset = offset};
 }
 
 VdvrGoldShape GoldBatch::shape_on_device() const {
@@ -249,84 +240,86 @@ std::vector<AxisErrors> GoldBatch::axis_errors(const std::vector<std::int64_t>& 
   return out;
 }
 
-// The node test of one level, fitted, on these bricks: the largest that |V - F| may be.
-std::vector<float> GoldBatch::errors_at(const LevelTriple& level, const std::vector<std::int64_t>& bricks) {
-  require_slack();
-  const opencl::DeviceArray<cl_int4> on_device = places(bricks);
-  const LevelSamples& samples = lattice(level, bricks);
-  opencl::DeviceArray<cl_int> error(state_, bricks.size(), "brick errors");
-  error.fill(-1);
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer,
-                 cl::Buffer, VdvrGoldShape, VdvrLattice>
-      level_error(state_, "certify/gold/classify", "level_error", brick_nodes());
-  level_error(columns_of_bricks(bricks.size()), error.buffer(), on_device.buffer(),
-              to_int(static_cast<std::int64_t>(bricks.size())), nodes_each(), samples.along.buffer(),
-              gold_.buffer(), above_.buffer(), below_.buffer(), margin_.buffer(), shape_on_device(),
-              samples.shape);
-  std::vector<float> out;
-  for (const cl_int b : error.to_host()) out.push_back(b < 0 ? -1.0f : std::bit_cast<float>(b));
-  return out;
+// No more room than gold itself takes.
+void GoldBatch::fit_tiles(Tiles tiles, bool tested, const OnFitted& visit) {
+  if (tiles.empty()) return;
+  if (tested) require_slack();
+  const TestedGold gold{
+      gold_,          margin_,      tested ? above_ : gold_, tested ? below_ : gold_, shape_on_device(),
+      shape_.z_first, shape_.z_last};
+  std::vector<TileToFit> asked;
+  for (const auto& [brick, level] : tiles) {
+    const auto [b, x, y, z] = place(brick);
+    asked.push_back({b, {x * side(), y * side(), z * side()}, spacing_of(level)});
+  }
+  const int steps = settings_.midrange ? level_fit_steps : 0;
+  std::span<const TileToFit> rest(asked);
+  while (!rest.empty()) {
+    const auto part = rest.first(TileFit::together(gold, rest, side(), steps, gold_.size()));
+    const auto first = asked.size() - rest.size();
+    const auto errors = tile_fit_(gold, part, side(), steps, of_curvature_ * settings_.curvature, tested);
+    visit(first, part.size(), errors);
+    rest = rest.subspan(part.size());
+  }
 }
-
-namespace {
-
-// Equal tiles, in the order of the bricks.
-void give_tiles(const std::vector<BrickClass*>& bricks, const std::vector<float>& samples) {
-  const std::size_t size = bricks.empty() ? 0 : samples.size() / bricks.size();
-  for (std::size_t i = 0; i < bricks.size(); ++i)
-    bricks[i]->tile.assign(samples.begin() + static_cast<std::ptrdiff_t>(i * size),
-                           samples.begin() + static_cast<std::ptrdiff_t>((i + 1) * size));
-}
-
-}  // namespace
 
 struct GoldBatch::Candidate {
   BrickClass* result;
   TripleSearch::Brick search;
 };
 
-// Every brick names its next level, and all that name the cheapest of these are tested together. What a brick
-// names next is seldom cheaper: most levels are fitted once.
-void GoldBatch::try_levels(std::vector<Candidate>& candidates, const TripleSearch& search,
+// Every brick names its next level, and all that are named are fitted and tested together.
+void GoldBatch::try_levels(std::vector<Candidate> open, const TripleSearch& search,
                            const NodeTolerance& tolerances) {
-  std::map<std::size_t, std::pair<LevelTriple, std::vector<Candidate>>> by_rank;
-  const auto tolerance_of = [&](const Candidate& c) {
-    return static_cast<float>(tolerances.of(at(c.result->base.brick)));
-  };
-  const auto ask = [&](Candidate&& c) {
-    if (const auto level = search.next(c.search, tolerance_of(c))) {
-      auto& [named, group] = by_rank[search.rank(*level)];
-      named = *level;
-      group.push_back(std::move(c));
-    }
-  };
-  for (Candidate& c : candidates) ask(std::move(c));
-  while (!by_rank.empty()) {
-    auto [level, group] = std::move(by_rank.begin()->second);
-    by_rank.erase(by_rank.begin());
-    std::vector<std::int64_t> bricks, passed;
-    for (const Candidate& c : group) bricks.push_back(c.result->base.brick);
-    const std::vector<float> errors = errors_at(level, bricks);
-    std::vector<BrickClass*> results;
-    for (std::size_t i = 0; i < group.size(); ++i) {
-      if (!(errors[i] <= tolerance_of(group[i]))) continue;
-      passed.push_back(bricks[i]);
-      results.push_back(group[i].result);
-    }
-    give_tiles(results, copy_tiles(level, passed, &fit_.last()));
-    for (std::size_t i = 0; i < group.size(); ++i) {
-      BrickClass& result = *group[i].result;
-      const float total =
-          errors[i] + rounding_share * static_cast<float>(rounding_of(result.tile, settings_.lattice));
-      if (total <= tolerance_of(group[i])) {
-        result.level = level;
-        result.passes = true;
-      } else {
-        result.tile.clear();
-        search.fail(group[i].search, level, total);
-        ask(std::move(group[i]));
+  while (!open.empty()) {
+    std::vector<Candidate> asking, failed;
+    std::vector<std::pair<std::int64_t, LevelTriple>> tiles;
+    for (Candidate& c : open) {
+      const auto tolerance = static_cast<float>(tolerances.of(at(c.result->base.brick)));
+      if (const auto level = search.next(c.search, tolerance)) {
+        tiles.emplace_back(c.result->base.brick, *level);
+        asking.push_back(std::move(c));
       }
     }
+    fit_tiles(tiles, true, [&](std::size_t first, std::size_t n, const std::vector<float>& errors) {
+      take_passed(Tiles(tiles).subspan(first, n), errors, std::span(asking).subspan(first, n), search,
+                  tolerances, failed);
+    });
+    open = std::move(failed);
+  }
+}
+
+// What passes gets its tile; what does not, or would not once its tile is rounded, names another level.
+void GoldBatch::take_passed(Tiles tiles, const std::vector<float>& errors, std::span<Candidate> candidates,
+                            const TripleSearch& search, const NodeTolerance& tolerances,
+                            std::vector<Candidate>& failed) {
+  const auto tolerance_of = [&](std::size_t i) {
+    return static_cast<float>(tolerances.of(at(tiles[i].first)));
+  };
+  std::vector<std::pair<std::int64_t, LevelTriple>> passed;
+  std::vector<TileFit::Place> places;
+  for (std::size_t i = 0; i < tiles.size(); ++i)
+    if (errors[i] <= tolerance_of(i)) {
+      passed.push_back(tiles[i]);
+      places.push_back(tile_fit_.place(i));
+    }
+  auto found = copy_tiles(passed, places, tile_fit_.samples());
+  auto next = found.begin();
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    float total = errors[i];
+    if (errors[i] <= tolerance_of(i)) {
+      std::vector<float>& tile = *next++;
+      total += rounding_share * static_cast<float>(rounding_of(tile, settings_.lattice));
+      if (total <= tolerance_of(i)) {
+        BrickClass& result = *candidates[i].result;
+        result.tile = std::move(tile);
+        result.level = tiles[i].second;
+        result.passes = true;
+        continue;
+      }
+    }
+    search.fail(candidates[i].search, tiles[i].second, total);
+    failed.push_back(std::move(candidates[i]));
   }
 }
 
@@ -351,71 +344,84 @@ std::vector<BrickClass> GoldBatch::classify(const DeviceField& base, const NodeT
       c.along = errors[candidates.size()];
       candidates.push_back({&c, {c.along, c.base.slack}});
     }
-  try_levels(candidates, TripleSearch(settings_, proposing()), tolerance);
+  try_levels(std::move(candidates), TripleSearch(settings_, proposing()), tolerance);
 
   // A tile needs a level above 0, even where the base is gold.
   LevelTriple finest = settings_.finest();
   if (finest == LevelTriple{0, 0, 0}) finest = {1, 1, 1};
-  std::vector<std::int64_t> bricks;
-  std::vector<BrickClass*> results;
+  std::vector<std::pair<std::int64_t, LevelTriple>> tiles;
   for (BrickClass& c : out) {
     if (c.passes) continue;
     c.level = finest;
-    bricks.push_back(c.base.brick);
-    results.push_back(&c);
+    tiles.emplace_back(c.base.brick, finest);
   }
-  if (gold_too) give_tiles(results, copy_tiles(finest, bricks, nullptr));
+  if (!gold_too) return out;
+  std::vector<std::vector<float>> samples = tiles_of_gold(tiles);
+  auto next = samples.begin();
+  for (BrickClass& c : out)
+    if (!c.passes) c.tile = std::move(*next++);
   return out;
 }
 
-// Tiles of one level from its lattice, concatenated.
-std::vector<float> GoldBatch::copy_tiles(const LevelTriple& level, const std::vector<std::int64_t>& bricks,
-                                         const LevelSamples* lattice) {
-  if (bricks.empty()) return {};
+// Samples at the gold rate are gold.
+std::vector<std::vector<float>> GoldBatch::tiles_of_gold(Tiles tiles) {
+  std::vector<TileFit::Place> places;
+  const std::int64_t h = shape_.halo, wide = shape_.nx + 2 * h, deep = shape_.ny + 2 * h;
+  for (const auto& [brick, level] : tiles) {
+    const auto [b, x, y, z] = place(brick);
+    const std::int64_t column = (b * deep + y * side() + h) * wide + x * side() + h;
+    places.push_back({count(column * shape_.gold_stride + z * side() + h),
+                      {shape_.gold_stride, wide * shape_.gold_stride, 1}});
+  }
+  return copy_tiles(tiles, places, gold_);
+}
+
+// Samples of tiles from where they lie.
+std::vector<std::vector<float>> GoldBatch::copy_tiles(Tiles tiles, const std::vector<TileFit::Place>& places,
+                                                      const opencl::DeviceArray<float>& samples) {
+  if (tiles.empty()) return {};
   std::vector<TileRequest> requests;
-  std::uint64_t total = 0, size = 0;
-  for (const std::int64_t brick : bricks) {
-    requests.push_back(request(brick, spacing_of(level), total));
-    size = count(std::int64_t{requests[0].side_x} * requests[0].side_y * requests[0].side_z);
-    total += size;
+  std::uint64_t total = 0;
+  const auto size = [](const TileRequest& r) { return count(std::int64_t{r.side_x} * r.side_y * r.side_z); };
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    requests.push_back(request(tiles[i].first, spacing_of(tiles[i].second), places[i], total));
+    total += size(requests.back());
   }
   const opencl::DeviceArray<float> out(state_, total, "tiles of a block");
   const auto on_device = opencl::copied<TileRequest>(state_, requests, "tile requests");
-  // Samples at the gold rate are gold, and gold lies as its own lattice would.
-  const VdvrLattice gold{1,
-                         1,
-                         1,
-                         to_int(shape_.halo),
-                         to_int(shape_.halo),
-                         to_int(shape_.halo),
-                         to_int(shape_.nx + 2 * shape_.halo),
-                         to_int(shape_.ny + 2 * shape_.halo),
-                         to_int(shape_.gold_stride)};
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, VdvrGoldShape, VdvrLattice, cl_float>
-      kernel(state_, "certify/gold/classify", "extract_tiles", brick_nodes());
-  kernel({{size, requests.size(), 1}, {64, 1, 1}}, out.buffer(),
-         (lattice ? lattice->samples : gold_).buffer(), margin_.buffer(), on_device.buffer(),
-         to_int(static_cast<std::int64_t>(requests.size())), shape_on_device(),
-         lattice ? lattice->shape : gold, static_cast<cl_float>(-settings_.kept()));
-  return out.to_host();
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_int, VdvrGoldShape, cl_float> kernel(
+      state_, "certify/gold/classify", "extract_tiles", brick_nodes());
+  kernel(opencl::shared_groups(state_.info, {requests.size(), 1, 1}), out.buffer(), samples.buffer(),
+         margin_.buffer(), on_device.buffer(), to_int(static_cast<std::int64_t>(requests.size())),
+         shape_on_device(), static_cast<cl_float>(-settings_.kept()));
+  const std::vector<float> found = out.to_host();
+  std::vector<std::vector<float>> split;
+  auto from = found.begin();
+  for (const TileRequest& r : requests) {
+    const auto end = from + static_cast<std::ptrdiff_t>(size(r));
+    split.emplace_back(from, end);
+    from = end;
+  }
+  return split;
 }
 
 std::vector<float> GoldBatch::extract(const std::vector<std::pair<std::int64_t, LevelTriple>>& tiles) {
-  std::map<LevelTriple, std::vector<std::size_t>> by_level;
-  for (std::size_t i = 0; i < tiles.size(); ++i) by_level[tiles[i].second].push_back(i);
-  std::vector<std::vector<float>> parts(tiles.size());
-  for (const auto& [level, members] : by_level) {
-    std::vector<std::int64_t> bricks;
-    for (const std::size_t i : members) bricks.push_back(tiles[i].first);
-    const bool is_gold = spacing_of(level) == Index3{1, 1, 1};
-    const auto samples = copy_tiles(level, bricks, is_gold ? nullptr : &lattice(level, bricks));
-    const std::size_t size = samples.size() / members.size();
-    for (std::size_t i = 0; i < members.size(); ++i)
-      parts[members[i]].assign(samples.begin() + static_cast<std::ptrdiff_t>(i * size),
-                               samples.begin() + static_cast<std::ptrdiff_t>((i + 1) * size));
-  }
+  std::vector<std::pair<std::int64_t, LevelTriple>> fitted, gold;
+  const auto is_gold = [&](const auto& tile) { return spacing_of(tile.second) == Index3{1, 1, 1}; };
+  for (const auto& tile : tiles) (is_gold(tile) ? gold : fitted).push_back(tile);
+  std::vector<std::vector<float>> of_gold = tiles_of_gold(gold), of_fits;
+  fit_tiles(fitted, false, [&](std::size_t first, std::size_t n, const std::vector<float>&) {
+    std::vector<TileFit::Place> places;
+    for (std::size_t i = 0; i < n; ++i) places.push_back(tile_fit_.place(i));
+    for (auto& tile : copy_tiles(Tiles(fitted).subspan(first, n), places, tile_fit_.samples()))
+      of_fits.push_back(std::move(tile));
+  });
   std::vector<float> out;
-  for (const auto& part : parts) out.insert(out.end(), part.begin(), part.end());
+  auto next_gold = of_gold.begin(), next_fit = of_fits.begin();
+  for (const auto& tile : tiles) {
+    const std::vector<float>& samples = is_gold(tile) ? *next_gold++ : *next_fit++;
+    out.insert(out.end(), samples.begin(), samples.end());
+  }
   return out;
 }
 
@@ -423,7 +429,14 @@ void GoldBatch::fit_base(const std::function<void(std::size_t, float)>& put) {
   const Grid& grid = settings_.grid;
   const Index3 n = grid.samples();
   const std::int64_t g = settings_.granularity, rate = settings_.rate;
-  const LevelSamples& fitted = lattice({0, 0, 0}, bricks_);
+  std::vector<NodeBox> boxes;
+  for (const std::int64_t brick : bricks_) {
+    const auto [b, x, y, z] = place(brick);
+    boxes.push_back(
+        {b, {x * side(), y * side(), z * side()}, {(x + 1) * side(), (y + 1) * side(), (z + 1) * side()}});
+  }
+  const BaseLattice& fitted =
+      base_fit_(gold_, margin_, boxes, settings_.midrange ? base_fit_steps : 0, settings_.curvature);
   const VdvrLattice& l = fitted.shape;
   const std::vector<float> samples = fitted.samples.to_host(), &margins = margins_;
   const auto kept = static_cast<float>(-kept_margin(grid, 1));

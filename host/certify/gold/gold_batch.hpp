@@ -4,12 +4,15 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <span>
 #include <utility>
 #include <vector>
 
 #include "host/certify/gold/cell_test.hpp"
+#include "host/certify/gold/fit_base.hpp"
+#include "host/certify/gold/fit_tiles.hpp"
 #include "host/certify/gold/gold_stream.hpp"
 #include "host/certify/gold/node_tolerance.hpp"
 
@@ -113,25 +116,32 @@ class GoldBatch {
   friend class GoldStream;
   struct TileRequest;
   struct Candidate;
-  [[nodiscard]] TileRequest request(std::int64_t brick, const Index3& spacing, std::uint64_t offset) const;
-  void try_levels(std::vector<Candidate>& candidates, const TripleSearch& search,
-                  const NodeTolerance& tolerances);
-  std::vector<float> errors_at(const LevelTriple& level, const std::vector<std::int64_t>& bricks);
-  std::vector<float> copy_tiles(const LevelTriple& level, const std::vector<std::int64_t>& bricks,
-                                const LevelSamples* lattice);
+  [[nodiscard]] TileRequest request(std::int64_t brick, const Index3& spacing, const TileFit::Place& place,
+                                    std::uint64_t offset) const;
+  void try_levels(std::vector<Candidate> open, const TripleSearch& search, const NodeTolerance& tolerances);
+  using Tiles = std::span<const std::pair<std::int64_t, LevelTriple>>;
+  /// Of tiles that are fitted together, whose samples tile_fit_ then has: the first, how many, and what the
+  /// node test finds if asked.
+  using OnFitted = std::function<void(std::size_t, std::size_t, const std::vector<float>&)>;
+  void fit_tiles(Tiles tiles, bool tested, const OnFitted& visit);
+  void take_passed(Tiles tiles, const std::vector<float>& errors, std::span<Candidate> candidates,
+                   const TripleSearch& search, const NodeTolerance& tolerances,
+                   std::vector<Candidate>& failed);
+  std::vector<std::vector<float>> tiles_of_gold(Tiles tiles);
+  std::vector<std::vector<float>> copy_tiles(Tiles tiles, const std::vector<TileFit::Place>& places,
+                                             const opencl::DeviceArray<float>& samples);
   [[nodiscard]] opencl::Defines brick_nodes() const;
   [[nodiscard]] VdvrGoldShape shape_on_device() const;
   void take_addends(const std::vector<float>& addends, const GoldErrors& errors, float of_curvature);
   // Slack node by node, made when first asked for.
   void require_slack();
   GoldBatch(opencl::State& state, const GoldSettings& settings)
-      : state_(state), settings_(settings), fit_(state, shape_) {}
+      : state_(state), settings_(settings), base_fit_(state, shape_), tile_fit_(state) {}
   void choose(std::vector<std::array<std::int64_t, 2>> first, std::int64_t first_z,
               const std::vector<std::uint8_t>& selected);
   [[nodiscard]] std::array<std::int64_t, 4> place(std::int64_t brick) const;  // block, then x, y, z inside it
   [[nodiscard]] std::uint64_t blocks() const { return first_brick_.size(); }
-  /// Samples of a level on these bricks; valid until the next call.
-  const LevelSamples& lattice(const LevelTriple& level, const std::vector<std::int64_t>& bricks);
+  [[nodiscard]] std::int64_t side() const { return std::int64_t{settings_.granularity} * settings_.rate; }
   [[nodiscard]] Index3 spacing_of(const LevelTriple& level) const;
   /// Place in arrays per brick of the blocks, [block][z][y][x].
   [[nodiscard]] std::size_t slot(std::int64_t brick) const;
@@ -147,7 +157,8 @@ class GoldBatch {
   SlabShape slab_;
   std::int64_t stride_ = 0;     // of the slack's columns
   std::vector<float> margins_;  // what margin_ holds
-  LatticeFit fit_;
+  BaseFit base_fit_;
+  TileFit tile_fit_;
   std::vector<std::array<std::int64_t, 3>> first_brick_;
   std::vector<std::int64_t> bricks_;
   std::map<std::int64_t, std::array<std::int64_t, 4>> place_;

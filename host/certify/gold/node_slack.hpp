@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "host/certify/gold/fit_coefficients.hpp"
+#include "host/certify/gold/fit_base.hpp"
 #include "host/certify/gold/gold_source.hpp"
 
 namespace vdvr {

@@ -57,11 +57,6 @@ float TripleSearch::forecast(const Brick& brick, const LevelTriple& level) const
   return (fitted_ ? 0.5f : 1.0f) * std::max(plus, minus);
 }
 
-std::size_t TripleSearch::rank(const LevelTriple& level) const {
-  return static_cast<std::size_t>(std::find(candidates_.begin(), candidates_.end(), level) -
-                                  candidates_.begin());
-}
-
 std::optional<LevelTriple> TripleSearch::next(const Brick& brick, float tolerance) const {
   for (const LevelTriple& level : candidates_) {
     if (brick.failed.size() >= most_failures && !is_isotropic(level)) continue;

@@ -32,8 +32,6 @@ class TripleSearch {
   };
   /// The cheapest triple that is foreseen to pass; none: only gold is left.
   [[nodiscard]] std::optional<LevelTriple> next(const Brick& brick, float tolerance) const;
-  /// How many triples are cheaper, or as cheap and tried before it.
-  [[nodiscard]] std::size_t rank(const LevelTriple& level) const;
   /// That triple was tried and took `total`, which is too much.
   void fail(Brick& brick, const LevelTriple& level, float total) const;
 

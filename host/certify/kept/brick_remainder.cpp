@@ -23,9 +23,9 @@ static_assert(sizeof(VdvrFourthDifferences) == 44);
 namespace {
 
 using std::numbers::pi;
-// Bricks of a block's side. Of cone beam half as many across: nodes of all that a block reads are kept, and
-// they cost more.
-constexpr std::int64_t block_bricks = 8, cone_block_bricks = 4;
+// Bricks of a block's side; across more where there are few along z, since small launches cost more than they
+// compute. Of cone beam half as many across: nodes of all that a block reads are kept, and they cost more.
+constexpr std::int64_t block_bricks = 8, most_block_bricks = 16, cone_block_bricks = 4;
 // Nodes that a fourth difference reads on either side.
 constexpr std::int64_t difference_reach = 2;
 // fp32: up to nine terms with weights that add to 16, in units of u times the largest value.
@@ -221,7 +221,11 @@ template <class Visit>
 void BrickRemainder::for_each_block(Visit&& visit) const {
   Block block;
   Index3& first = block.first;
-  const std::int64_t across = scan_.views.empty() ? block_bricks : cone_block_bricks;
+  const std::int64_t layers = std::min(block_bricks, bricks_[2] + 2 * rings_[2]);
+  std::int64_t across = scan_.views.empty() ? block_bricks : cone_block_bricks;
+  while (scan_.views.empty() && across < most_block_bricks &&
+         (across + 1) * (across + 1) * layers <= block_bricks * block_bricks * block_bricks)
+    ++across;
   const Index3 side{across, across, block_bricks};
   for (first[2] = -rings_[2]; first[2] < bricks_[2] + rings_[2]; first[2] += side[2])
     for (first[1] = -rings_[1]; first[1] < bricks_[1] + rings_[1]; first[1] += side[1])

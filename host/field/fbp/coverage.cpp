@@ -191,8 +191,8 @@ void Coverage::add_least(std::int64_t sector) {
 }
 
 double Coverage::margin(double x, double y) const {
-  const double r = std::hypot(x, y);
-  if (r < inner_) {  // covered whatever the angles
+  const double r = std::sqrt(x * x + y * y);  // hypot takes three times as long
+  if (r < inner_) {                           // covered whatever the angles
     // The least margin on a circle is concave in its radius: it lies above its chords.
     const double place = r / inner_ * circles;
     const auto i = std::min(static_cast<std::size_t>(place), static_cast<std::size_t>(circles - 1));
@@ -209,7 +209,7 @@ double Coverage::margin(double x, double y) const {
 }
 
 double Coverage::margin_above(double x, double y, double floor) const {
-  if (std::hypot(x, y) > inner_) {
+  if (x * x + y * y > inner_ * inner_) {
     const double far = planes_[nearest_[sector_of(x, y)]].margin(x, y) + slack_;
     if (far < floor) return far;
   }

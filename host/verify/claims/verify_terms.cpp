@@ -12,7 +12,7 @@
 #include "host/base/system/casts.hpp"
 #include "host/certify/bounds/column_taps.hpp"
 #include "host/certify/crew/gold_rates.hpp"
-#include "host/certify/gold/base_of_gold.hpp"
+#include "host/certify/kept/base_of_gold.hpp"
 #include "host/certify/gold/gold_batch.hpp"
 #include "host/field/fbp/reconstruct.hpp"
 #include "host/field/fdk/filter_cone.hpp"

@@ -372,7 +372,7 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
 #else
         float v[VDVR_LANES + 12];
         field_along(&p, &at, samples, begin, v);
-        const VEC low_v = READ(v), high_v = READ(v + 1);
+        const VEC low_v = READ_OWN(v), high_v = READ_OWN(v + 1);
 #endif
         add_errors(&here, low_v, high_v, gold, low_tested, end_tested);
       }
@@ -403,9 +403,9 @@ __kernel void cell_test(volatile __global int* total, volatile __global int* err
           largest_passed = MORE(largest_passed, select(-unlimited, both, both <= tolerance));
           if (ANY(both > tolerance)) {
             float totals[VDVR_LANES], belows[VDVR_LANES], aboves[VDVR_LANES];
-            WRITE(both, totals);
-            WRITE(below, belows);
-            WRITE(above, aboves);
+            WRITE_OWN(both, totals);
+            WRITE_OWN(below, belows);
+            WRITE_OWN(above, aboves);
             for (int i = 0; i < VDVR_LANES; ++i) {
               if (!(totals[i] > tolerance)) continue;
               low_z = min(low_z, begin + i);

@@ -1,24 +1,15 @@
-// The node test of every level on a block of gold samples (the paper's Eq. 10, per node), and the samples of
-// chosen tiles. Layouts as in node_slack.cl. A brick is VDVR_GRANULARITY^3 base cells; level l of an axis
+// Errors along single axes on a block of gold samples, and the samples of chosen tiles. Layouts as in
+// node_slack.cl. A brick is VDVR_GRANULARITY^3 base cells; level l of an axis
 // samples every (rate * 2^coarsening >> l)-th gold node. Called by host/certify/gold/gold_batch.cpp.
 #include "device/lanes.h"
-#include "device/powers.h"
+#include "device/shared_column.h"
 #include "shared/gold_shape.h"
-#include "shared/lattice_shape.h"
 
 #ifndef VDVR_BRICK_NODES
 #error "VDVR_BRICK_NODES must be granularity * gold rate"
 #endif
-// The level's interpolant less gold at VDVR_LANES nodes of one column, or gold itself at 1x spacing.
-#define ERROR_AT(z)                                                                                \
-  (fma((VEC)(1.0f - fy), fma((VEC)(1.0f - fx), READ(a + (z)), fx * READ(a + s.gold_stride + (z))), \
-       fy * fma((VEC)(1.0f - fx), READ(b + (z)), fx * READ(b + s.gold_stride + (z)))) -            \
-   READ(gold_column + (z)))
-
-// Raises error[i] to the largest that |interpolant - F| may be at the closed nodes of the brick bricks[i]:
-// its block, and its place x, y, z in it. It starts negative and stays so where no node of a brick is tested.
-// Positive floats order as their bits do. One work-item does `each` nodes of a column of a
-// brick; nodes, or runs of them, follow one another along z, then x, then y.
+// A brick bricks[i] is its block, and its place x, y, z in it. One work-item does `each` nodes of a column of
+// a brick; nodes, or runs of them, follow one another along z, then x, then y.
 typedef struct {
   int i, block, x, y, bz;  // of the bricks; in them all; nodes of the block
   int from;                // node of the brick
@@ -35,49 +26,6 @@ static inline bool find_column(Column* c, __global const int4* bricks, int count
   c->bz = bricks[c->i].s3;
   return c->x < s.nx && c->y < s.ny;
 }
-__kernel void level_error(volatile __global int* error, __global const int4* bricks, int count, int each,
-                          __global const float* along, __global const float* gold,
-                          __global const float* above, __global const float* below,
-                          __global const float* margin, VdvrGoldShape s, VdvrLattice l) {
-  Column c;
-  if (!find_column(&c, bricks, count, each, s)) return;
-  const int i = c.i, block = c.block, x = c.x, y = c.y;
-  const size_t column = ((size_t)block * s.ny + y) * s.nx + x;
-  const size_t gold_at =
-      ((size_t)block * (s.ny + 2 * s.halo) + y + s.halo) * (s.nx + 2 * s.halo) + x + s.halo;
-  if (margin[gold_at] < s.lowest) return;
-  const int ix = min(x / l.spacing_x, (s.nx - 1) / l.spacing_x - 1),
-            iy = min(y / l.spacing_y, (s.ny - 1) / l.spacing_y - 1);
-  const float fx = (float)(x - ix * l.spacing_x) * inverse_of_power(l.spacing_x),
-              fy = (float)(y - iy * l.spacing_y) * inverse_of_power(l.spacing_y);
-  const int first = c.bz * VDVR_BRICK_NODES, last = min(first + VDVR_BRICK_NODES, s.nz - 1);
-  __global const float* a =
-      along + (((size_t)block * l.cy + iy + l.reach_y) * l.cx + ix + l.reach_x) * s.gold_stride + s.halo +
-      first;
-  __global const float* b = a + (size_t)l.cx * s.gold_stride;
-  __global const float* gold_column = gold + gold_at * s.gold_stride + s.halo + first;
-  __global const float *above_column = above + column * s.stride + first,
-                       *below_column = below + column * s.stride + first;
-
-  // Whole runs of lanes, then the rest one by one: beyond the block lies what no lane may count.
-  float largest = -1.0f;
-  int z = c.from;
-  const int end = min(z + each, last - first + 1);
-  for (; z + VDVR_LANES <= end; z += VDVR_LANES) {
-    const VEC e = ERROR_AT(z);
-    largest = fmax(largest, LARGEST(fmax(e + READ(below_column + z), READ(above_column + z) - e)));
-  }
-#if VDVR_LANES > 1
-  for (; z < end; ++z) {
-    const float v = fma(1.0f - fy, fma(1.0f - fx, a[z], fx * a[s.gold_stride + z]),
-                        fy * fma(1.0f - fx, b[z], fx * b[s.gold_stride + z]));
-    const float e = v - gold_column[z];
-    largest = fmax(largest, fmax(e + below_column[z], above_column[z] - e));
-  }
-#endif
-  if (largest >= 0.0f && as_int(largest) > error[i]) atomic_max(error + i, as_int(largest));
-}
-
 // How far linear interpolation along one axis alone errs in the middles of its cells, for every level below
 // the gold rate: the largest of interpolant - gold and of gold - interpolant. errors[brick i][axis x, y,
 // z][level of most_levels][sign], starting at 0. A node that is no sample of the
@@ -110,7 +58,7 @@ static inline int half_of(int level, int levels) { return 1 << max(levels - 1 - 
   }
 #define RAISE_Z(l) \
   if (l < levels_z) raise_pair(out + 2 * (2 * most_levels + l), LARGEST(plus_z##l), LARGEST(minus_z##l));
-// As level_error. levels_z: six at most.
+// Positive floats order as their bits do. levels_z: six at most.
 __kernel void axis_errors(volatile __global int* errors, __global const int4* bricks, int count, int each,
                           __global const float* gold, __global const float* margin, VdvrGoldShape s,
                           int levels_x, int levels_y, int levels_z, int most_levels) {
@@ -147,30 +95,35 @@ __kernel void axis_errors(volatile __global int* errors, __global const int4* br
   FOR_LEVELS(RAISE_Z)
 }
 
-// Copies the samples of tiles out of a lattice: request i writes tile samples float[sz][sy][sx] at `offset`.
+// Copies the samples of tiles out of lattices, or of gold: request i writes tile samples float[sz][sy][sx] at
+// `offset`.
 typedef struct {
-  int block, node_x, node_y, node_z;    // of the brick's first node in its block
-  int spacing_x, spacing_y, spacing_z;  // in gold nodes
-  int side_x, side_y, side_z;           // samples
-  int last_x, last_y, last_z;           // last node of the grid inside the block: beyond it planes repeat
-  int pad;
-  ulong offset;
+  int block, node_x, node_y;   // of the brick's first node in its block
+  int spacing_x, spacing_y;    // in gold nodes
+  int side_x, side_y, side_z;  // samples
+  int last_x, last_y, last_z;  // last sample of the grid inside the block: beyond it planes repeat
+  int step_x, step_y, step_z;  // from sample to sample, in floats
+  ulong from, offset;          // of the first sample
 } TileRequest;
 
-// From the lattice of their triple (fit_coefficients.cl).
-__kernel void extract_tiles(__global float* out, __global const float* lattice, __global const float* margin,
-                            __global const TileRequest* requests, int count, VdvrGoldShape s, VdvrLattice l,
-                            float kept) {
-  const int i = (int)get_global_id(0), request = (int)get_global_id(1);
+__kernel SHARED_COLUMN void extract_tiles(__global float* out, __global const float* samples,
+                                          __global const float* margin, __global const TileRequest* requests,
+                                          int count, VdvrGoldShape s, float kept) {
+  const int request = (int)get_global_id(0) / VDVR_ALONG;
   if (request >= count) return;
   const TileRequest r = requests[request];
-  if (i >= r.side_x * r.side_y * r.side_z) return;
-  const int ix = i % r.side_x, iy = i / r.side_x % r.side_y, iz = i / r.side_x / r.side_y;
-  const int x = min(r.node_x + ix * r.spacing_x, r.last_x), y = min(r.node_y + iy * r.spacing_y, r.last_y);
-  const int z = min(r.node_z + iz * r.spacing_z, r.last_z);
-  const bool keep =
-      margin[((size_t)r.block * (s.ny + 2 * s.halo) + y + s.halo) * (s.nx + 2 * s.halo) + x + s.halo] >= kept;
-  const size_t column =
-      ((size_t)r.block * l.cy + y / l.spacing_y + l.reach_y) * l.cx + x / l.spacing_x + l.reach_x;
-  out[r.offset + i] = keep ? lattice[column * l.cz + z / l.spacing_z + l.reach_z] : 0.0f;
+  for (int i = OWN_PART; i < r.side_y * r.side_z; i += VDVR_ALONG) {
+    const int z = i / r.side_y, y = min(i - z * r.side_y, r.last_y);
+    __global const float* from =
+        samples + r.from + (size_t)min(z, r.last_z) * r.step_z + (size_t)y * r.step_y;
+    __global const float* m =
+        margin +
+        ((size_t)r.block * (s.ny + 2 * s.halo) + r.node_y + y * r.spacing_y + s.halo) * (s.nx + 2 * s.halo) +
+        r.node_x + s.halo;
+    __global float* to = out + r.offset + (size_t)i * r.side_x;
+    for (int k = 0; k < r.side_x; ++k) {
+      const int x = min(k, r.last_x);
+      to[k] = m[x * r.spacing_x] >= kept ? from[(size_t)x * r.step_x] : 0.0f;
+    }
+  }
 }

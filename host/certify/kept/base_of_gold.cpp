@@ -1,4 +1,4 @@
-#include "host/certify/gold/base_of_gold.hpp"
+#include "host/certify/kept/base_of_gold.hpp"
 
 #include <algorithm>
 
