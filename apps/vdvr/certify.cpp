@@ -128,7 +128,6 @@ Planned read_and_plan(Device& device, const Arguments& args, const Wanted& asked
   Wanted wanted = asked;
   Planned planned;
   planned.scan = load_scan(args.path("IN"), args, wanted.options.field, progress, &planned.understood);
-  build_ahead(device, args, planned.scan);
   choose_tolerance(planned, wanted, args);
   if (seen) seen(planned);
   const auto plan = [&] {

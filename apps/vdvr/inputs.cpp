@@ -243,10 +243,6 @@ ProjectionSet load_scan_to_verify(const fs::path& path, const Arguments& args, c
                  path);
 }
 
-void build_ahead(Device& device, const Arguments& args, const ProjectionSet& scan) {
-  device.build_ahead(fmt::format("{}, {}", args.who(), scan.cone ? "cone beam" : "parallel beam"));
-}
-
 // --- the noise of scans ---
 
 void add_noise(Arguments& args) {

@@ -59,9 +59,6 @@ ProjectionSet load_certified_scan(const std::filesystem::path& path, const Argum
 ProjectionSet load_scan_to_verify(const std::filesystem::path& path, const Arguments& args,
                                   const Certificate& certificate, const Progress& progress);
 
-/// Device::build_ahead() for what this command does with such a scan, which was read.
-void build_ahead(Device& device, const Arguments& args, const ProjectionSet& scan);
-
 // --- the noise of scans ---
 
 /// --photons and --sigma-p: what is known of the noise in place of what the scan tells.

@@ -77,7 +77,6 @@ Source::Source(const Arguments& args, const CommonOptions& common, const std::st
     devices_.push_back(std::make_unique<Device>(selector, memory));
     devices.push_back(devices_.back().get());
   }
-  if (devices.size() == 1) devices.front()->build_ahead(args.who());
   drawn_.emplace(devices, scene_->volume, progress);
 }
 

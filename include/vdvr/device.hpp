@@ -45,12 +45,6 @@ class VDVR_API Device {
   Device(const Device&) = delete;
   Device& operator=(const Device&) = delete;
 
-  /// Builds, beside what else is done, the programs of kernels that the last process with the same purpose
-  /// asked for, and notes for the next one which this one does, in the cache folder. It pays for PoCL, which
-  /// takes 20 ms for each that it has in its cache; elsewhere nothing happens. Call it once files are read:
-  /// readers start processes, which is not for when a compiler runs.
-  void build_ahead(const std::string& purpose);
-
   [[nodiscard]] const DeviceInfo& info() const;
   /// Bytes that may still be allocated under --max-memory and the device's own limit.
   [[nodiscard]] std::uint64_t memory_left() const;

@@ -2,8 +2,8 @@
 #ifndef VDVR_GOLD_SHAPE_H
 #define VDVR_GOLD_SHAPE_H
 
-// With the bricks under them. Passed by value from host/certify/gold/gold_batch.cpp to classify.cl and
-// cell_test.cl. 48 bytes.
+// With the bricks under them. Passed by value from host/certify/gold/gold_batch.cpp to classify.cl,
+// cell_test.cl and fit_tiles.cl. 48 bytes.
 typedef struct {
   int nx, ny, nz;                    // nodes of a block, without its halo
   int halo;                          // nodes on every side
@@ -14,7 +14,7 @@ typedef struct {
   float lowest;  // columns of a smaller coverage margin are not tested
 } VdvrGoldShape;
 
-// Alone. Passed by value from host/certify/gold/fit_coefficients.cpp to fit_coefficients.cl. 36 bytes.
+// Alone. Passed by value from host/certify/gold/fit_base.cpp to fit_base.cl. 36 bytes.
 typedef struct {
   int nx, ny, nz;   // nodes of a block, without its halo
   int halo;         // nodes on every side

@@ -77,7 +77,6 @@ int verify_command(Arguments& args) {
   const ProjectionSet scan = load_scan_to_verify(projections, args, certificate, progress.callback());
   check_projections(projections, scan, certificate);
   Device device = open_device(common);
-  build_ahead(device, args, scan);
   VerifyOptions options;
   options.exhaustive = args.has("exhaustive");
   const FileVerification result = verify_file(device, file, scan, options, progress.callback());

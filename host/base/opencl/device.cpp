@@ -178,7 +178,6 @@ State::State(State* main)
       main_(*main) {}
 
 State::~State() {
-  ahead_ = nullptr;  // its thread builds for this context
   strands_.clear();
   // Kernels may still run, and writes read what is staged.
   if (queue() != nullptr) clFinish(queue());
@@ -514,8 +513,6 @@ Device& Device::operator=(Device&& other) noexcept {
   }
   return *this;
 }
-
-void Device::build_ahead(const std::string& purpose) { state_->build_ahead(purpose); }
 
 const DeviceInfo& Device::info() const { return state_->info; }
 std::uint64_t Device::memory_left() const { return state_->memory.left(); }

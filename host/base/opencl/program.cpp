@@ -7,15 +7,15 @@
 // the field a compiler that we never saw may warn of what is right.
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <atomic>
 #include <cstdlib>
+#include <optional>
 #include <set>
 #include <sstream>
-#include <thread>
+#include <vector>
 
 #include "host/base/opencl/embedded.hpp"
 #include "host/base/opencl/state.hpp"
+#include "host/base/opencl/trust.hpp"
 #include "host/base/system/cache_files.hpp"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/hash.hpp"
@@ -64,10 +64,60 @@ std::string build_options(const Defines& defines) {
   return options;
 }
 
-std::size_t State::programs() {
+std::size_t State::programs_remembered() {
   const std::lock_guard guard(programs_lock_);
-  return programs_.size();
+  return programs_remembered_;
 }
+
+namespace {
+
+constexpr const char* kept_programs = "programs";
+constexpr std::uintmax_t most_kept = 64 << 20;
+
+// All that a binary depends on; none where it is not to be kept. PoCL reads a program with all of the
+// language's functions before it looks into its own cache: 20 to 60 ms each, of which a command asks for 20
+// or more. Intel's runtime for CPUs has none. Drivers of GPUs have their own.
+std::string binary_head(const State& state, const std::string& source, const std::string& options) {
+  const bool pays =
+      state.info.platform == pocl_platform || (state.info.is_cpu && state.info.platform.starts_with("Intel"));
+  if (!pays || behind_a_layer()) return {};
+  const char* flags = std::getenv("POCL_EXTRA_BUILD_FLAGS");
+  return "vdvr: a program of kernels\n" + identity(state) + sha256_of_text(source) + '\n' + options + '\n' +
+         (flags != nullptr ? flags : "") + '\n';
+}
+
+std::string file_of(const std::string& head) { return fmt::format("{}/{}", kept_programs, sha256_of_text(head)); }
+
+// As an earlier process had it built.
+std::optional<cl::Program> remembered(const State& state, const std::string& head,
+                                      const std::string& options) {
+  if (head.empty()) return std::nullopt;
+  const auto file = read_cached(file_of(head));
+  const auto inside = file ? unsealed(*file) : std::nullopt;
+  if (!inside || !inside->starts_with(head)) return std::nullopt;
+  try {
+    const std::vector<unsigned char> binary(inside->begin() + static_cast<std::ptrdiff_t>(head.size()),
+                                            inside->end());
+    cl::Program program(state.context, {state.device}, {binary});
+    program.build({state.device}, options.c_str());
+    return program;
+  } catch (const cl::Error&) {  // not what this driver takes any more: it is built anew
+    return std::nullopt;
+  }
+}
+
+void remember(const cl::Program& program, const std::string& head) {
+  if (head.empty()) return;
+  try {
+    const auto binaries = program.getInfo<CL_PROGRAM_BINARIES>();
+    if (binaries.size() != 1 || binaries[0].empty()) return;
+    write_cached(file_of(head), sealed(head + std::string(binaries[0].begin(), binaries[0].end())));
+    forget_oldest(kept_programs, most_kept);
+  } catch (const cl::Error&) {  // no binary to be had
+  }
+}
+
+}  // namespace
 
 const cl::Program& State::built(const std::string& name, const Defines& defines) {
   const std::string options = build_options(defines), key = name + ' ' + options;
@@ -79,9 +129,15 @@ const cl::Program& State::built(const std::string& name, const Defines& defines)
   if (const cl::Program* const there = known()) return *there;
   const std::lock_guard building(building_lock_);
   if (const cl::Program* const there = known()) return *there;
+  const std::string source = resolve_source(name + ".cl"), head = binary_head(*this, source, options);
+  if (auto found = remembered(*this, head, options)) {
+    const std::lock_guard guard(programs_lock_);
+    ++programs_remembered_;
+    return programs_.emplace(key, *std::move(found)).first->second;
+  }
   cl::Program program;
   try {
-    program = cl::Program(context, resolve_source(name + ".cl"));
+    program = cl::Program(context, source);
     program.build({device}, options.c_str());
   } catch (const cl::Error& e) {
     // LLVM's own handler removes the files of a compilation that a signal interrupts, which then fails.
@@ -95,6 +151,7 @@ const cl::Program& State::built(const std::string& name, const Defines& defines)
     throw BuildError(fmt::format("kernel program '{}' does not build on '{}' with options '{}': {} {}\n{}",
                                  name, info.name, options, e.what(), code_name(e.err()), log));
   }
+  remember(program, head);
   const std::lock_guard guard(programs_lock_);
   return programs_.emplace(key, std::move(program)).first->second;
 }
@@ -103,105 +160,8 @@ const cl::Program& program(State& of_strand, const std::string& name, const Defi
   State& state = of_strand.main_;
   const cl::Program& built = state.built(name, defines);
   const std::lock_guard guard(state.programs_lock_);
-  const std::pair wanted{name, defines};
-  if (std::ranges::find(state.asked_for_, wanted) == state.asked_for_.end()) {
-    state.asked_for_.push_back(wanted);
-    if (state.on_program) state.on_program(name, defines);
-  }
+  if (state.told_.insert(&built).second && state.on_program) state.on_program(name, defines);
   return built;
-}
-
-// --- ahead ---
-
-namespace {
-
-constexpr const char* list_head = "vdvr: programs of kernels that were asked for\n";
-constexpr std::size_t most_ahead = 256;
-
-// A program a line: its name, and its defines.
-std::string listed(const std::vector<std::pair<std::string, Defines>>& programs) {
-  std::string text = list_head;
-  for (const auto& [name, defines] : programs) {
-    text += name;
-    for (const auto& [key, value] : defines) text += fmt::format(" {}={}", key, value);
-    text += '\n';
-  }
-  return text + "end\n";
-}
-
-std::vector<std::pair<std::string, Defines>> programs_of(const std::string& text) {
-  std::vector<std::pair<std::string, Defines>> out;
-  if (!text.starts_with(list_head) || !text.ends_with("\nend\n")) return out;
-  std::istringstream lines(text.substr(std::string_view(list_head).size()));
-  for (std::string line; std::getline(lines, line) && line != "end" && out.size() < most_ahead;) {
-    std::istringstream words(line);
-    std::pair<std::string, Defines> program;
-    words >> program.first;
-    for (std::string word; words >> word;) {
-      const std::size_t at = word.find('=');
-      if (at == std::string::npos || !word.starts_with("VDVR_")) return {};
-      program.second.emplace_back(word.substr(0, at), word.substr(at + 1));
-    }
-    out.push_back(std::move(program));
-  }
-  return out;
-}
-
-}  // namespace
-
-// Builds, on a thread of its own, what a list of the cache folder names, and writes the list anew at the end.
-class ProgramsAhead {
- public:
-  ProgramsAhead(State& state, std::string file) : state_(state), file_(std::move(file)) {
-    read_ = read_cached(file_).value_or("");
-    std::vector<std::pair<std::string, Defines>> programs = programs_of(read_);
-    if (programs.empty()) return;
-    try {
-      thread_ = std::thread([this, list = std::move(programs)] { build(list); });
-    } catch (const std::exception&) {  // no thread to be had: programs are built when they are asked for
-    }
-  }
-  ~ProgramsAhead() {
-    stop_ = true;
-    if (thread_.joinable()) thread_.join();
-    try {
-      const std::string text = listed(state_.asked_for_);
-      if (!state_.asked_for_.empty() && text != read_) write_cached(file_, text);
-    } catch (const std::exception&) {  // no memory: the last list stays
-    }
-  }
-  ProgramsAhead(const ProgramsAhead&) = delete;
-  ProgramsAhead& operator=(const ProgramsAhead&) = delete;
-
- private:
-  void build(const std::vector<std::pair<std::string, Defines>>& programs) noexcept {
-    try {
-      for (const auto& [name, defines] : programs) {
-        if (stop_) return;
-        state_.built(name, defines);
-      }
-    } catch (...) {  // whoever asks for it is told
-    }
-  }
-
-  State& state_;
-  std::string file_, read_;
-  std::atomic<bool> stop_ = false;
-  std::thread thread_;
-};
-
-void State::build_ahead(const std::string& purpose) {
-  // It reads a program with all of the language's functions before it looks for it in its cache: 20 ms each.
-  if (info.platform != pocl_platform || ahead_) return;
-  const cl::Platform platform(device.getInfo<CL_DEVICE_PLATFORM>());
-  {
-    const std::lock_guard guard(programs_lock_);
-    asked_for_.clear();
-  }
-  ahead_ = std::make_shared<ProgramsAhead>(
-      *this,
-      "programs/" + sha256_of_text(fmt::format("{}\n{}\n{}\n{}", purpose, info.name,
-                                               platform.getInfo<CL_PLATFORM_VERSION>(), VDVR_VERSION)));
 }
 
 std::optional<ReadyKernel> KernelPool::take(const std::string& key) {

@@ -12,6 +12,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -129,8 +130,6 @@ struct Launched {
 /// Some of what follows is for its faults.
 inline constexpr const char* pocl_platform = "Portable Computing Language";
 
-class ProgramsAhead;
-
 /// Shared by the Device and by what may outlive it.
 struct State : std::enable_shared_from_this<State> {
   State();
@@ -179,14 +178,11 @@ struct State : std::enable_shared_from_this<State> {
   /// kernels are made, and by the thread that makes them.
   std::function<void(const std::string& name, const Defines&)> on_program;
 
-  /// Device::build_ahead().
-  void build_ahead(const std::string& purpose);
-  /// How many programs are built.
-  [[nodiscard]] std::size_t programs();
+  /// How many programs came from the cache folder.
+  [[nodiscard]] std::size_t programs_remembered();
 
  private:
   friend const cl::Program& program(State&, const std::string&, const Defines&);
-  friend class ProgramsAhead;
   const cl::Program& built(const std::string& name, const Defines& defines);
   // Of the pools of all strands.
   [[nodiscard]] std::uint64_t kept_bytes() const;
@@ -203,18 +199,19 @@ struct State : std::enable_shared_from_this<State> {
   std::map<std::string, Pace> paces_;  // by program, kernel and defines
   std::mutex building_lock_;           // one program at a time, and not of programs_, for which others wait
   std::mutex programs_lock_;
-  std::map<std::string, cl::Program> programs_;             // by name and defines
-  std::vector<std::pair<std::string, Defines>> asked_for_;  // each once
-  std::shared_ptr<ProgramsAhead> ahead_;
+  std::map<std::string, cl::Program> programs_;  // by name and defines
+  std::set<const cl::Program*> told_;            // of these on_program was told
+  std::size_t programs_remembered_ = 0;
 };
 
 /// "CL_OUT_OF_RESOURCES (-5)".
 std::string code_name(int code);
 
-/// Builds kernels/<name>.cl for the state's device, or returns the cached program, which lives as long as the
-/// state. One program is built at a time. `#include "shared/x.h"` is
-/// resolved from the embedded sources with #line directives. Throws BuildError with device, options and the
-/// compiler's log.
+/// Builds kernels/<name>.cl for the state's device, or returns the program that it has, which lives as long
+/// as the state. One program is built at a time. On PoCL, and on Intel's runtime for CPUs, binaries of the
+/// cache folder are taken where source, options, device and driver are theirs, which takes a millisecond.
+/// `#include "shared/x.h"` is resolved from the embedded sources with #line directives. Throws BuildError
+/// with device, options and the compiler's log.
 const cl::Program& program(State& state, const std::string& name, const Defines& defines = {});
 
 /// Full source text after resolving includes; what the compiler sees.

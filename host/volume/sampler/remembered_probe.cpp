@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cmath>
-#include <cstdlib>
 #include <locale>
 #include <sstream>
 #include <string>
@@ -17,13 +16,6 @@
 
 namespace vdvr {
 namespace {
-
-// Someone who stands between answers for the device, and does not say that it is not the device.
-bool behind_a_layer() {
-  for (const char* variable : {"LD_PRELOAD", "LD_AUDIT", "OPENCL_LAYERS"})
-    if (const char* value = std::getenv(variable); value != nullptr && *value != '\0') return true;
-  return false;
-}
 
 std::string head(const opencl::State& state) {
   constexpr int method = 1;  // one more with every change of what is measured, or charged for it
@@ -49,20 +41,15 @@ bool read_numbers(std::istream& line, FilterProbe& p) {
   return !line.fail() && (image3d == 0 || image3d == 1);
 }
 
-// The last line says that the others are what was written.
-std::string sealed(const std::string& text) { return text + sha256_of_text(text) + '\n'; }
-constexpr std::size_t seal_size = 65;
-
 }  // namespace
 
 std::optional<SamplerProbe> remembered_filters(const opencl::State& state) {
   if (behind_a_layer()) return std::nullopt;
   const std::string first = head(state);
   const auto known = read_cached(file_of(first));
-  if (!known || !known->starts_with(first) || known->size() < first.size() + seal_size ||
-      sealed(known->substr(0, known->size() - seal_size)) != *known)
-    return std::nullopt;
-  std::istringstream lines(known->substr(first.size()));
+  const auto inside = known ? unsealed(*known) : std::nullopt;
+  if (!inside || !inside->starts_with(first)) return std::nullopt;
+  std::istringstream lines(inside->substr(first.size()));
   SamplerProbe p;
   for (FilterProbe* const filter : std::array<FilterProbe*, 3>{&p, &p.u16, &p.u8}) {
     std::string line;
