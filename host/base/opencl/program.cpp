@@ -86,7 +86,9 @@ std::string binary_head(const State& state, const std::string& source, const std
          (flags != nullptr ? flags : "") + '\n';
 }
 
-std::string file_of(const std::string& head) { return fmt::format("{}/{}", kept_programs, sha256_of_text(head)); }
+std::string file_of(const std::string& head) {
+  return fmt::format("{}/{}", kept_programs, sha256_of_text(head));
+}
 
 // As an earlier process had it built.
 std::optional<cl::Program> remembered(const State& state, const std::string& head,
