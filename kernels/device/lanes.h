@@ -23,6 +23,8 @@
 #define STORE(v, p) (*(p) = (v))
 #define READ(p) (*(p))
 #define WRITE(v, p) (*(p) = (v))
+#define READ_OWN(p) (*(p))
+#define WRITE_OWN(v, p) (*(p) = (v))
 #define LARGEST(v) (v)
 #define FOR_LANES(M) M(0)
 #elif VDVR_LANES == 4
