@@ -131,8 +131,9 @@ VdvrGoldShape GoldBatch::shape_on_device() const {
 }
 
 opencl::Defines GoldBatch::brick_nodes() const {
-  return {{"VDVR_BRICK_NODES", std::to_string(settings_.granularity * settings_.rate)},
-          {"VDVR_LANES", std::to_string(opencl::lanes_of(state_.info, 16))}};
+  opencl::Defines defines = opencl::height_defines(state_.info, 16);
+  defines.emplace_back("VDVR_BRICK_NODES", std::to_string(side()));
+  return defines;
 }
 
 void GoldBatch::take_addends(const std::vector<float>& addends, const GoldErrors& errors,
