@@ -22,10 +22,16 @@ typedef struct {
   }
 // The nine columns of nodes around a sample's, at heights for which `nw` .. `se` are the lattice interpolated
 // along z: rows north (y - 1), middle, south; columns west (x - 1), middle, east. Along x first.
-#define FIT_COLUMNS(M)                                                                \
-  M(nw, -to_north - to_west)                                                          \
-  M(nm, -to_north) M(ne, -to_north + to_east) M(mw, -to_west) M(mm, 0) M(me, to_east) \
-      M(sw, to_south - to_west) M(sm, to_south) M(se, to_south + to_east)
+#define FIT_COLUMNS(M)       \
+  M(nw, -to_north - to_west) \
+  M(nm, -to_north)           \
+  M(ne, -to_north + to_east) \
+  M(mw, -to_west)            \
+  M(mm, 0)                   \
+  M(me, to_east)             \
+  M(sw, to_south - to_west)  \
+  M(sm, to_south)            \
+  M(se, to_south + to_east)
 #define FIT_AT(name, to) const VEC name = READ(c + (to));
 #define FIT_BELOW(name, to) const VEC name = HALF(READ(c + (to)-1), READ(c + (to)));
 #define FIT_ABOVE(name, to) const VEC name = HALF(READ(c + (to)), READ(c + (to) + 1));
