@@ -105,12 +105,14 @@ BOOST_AUTO_TEST_CASE(a_gpu_makes_the_volumes_of_a_cpu) {
 }
 
 // Of the small arrays of a launch none is waited for, and none has a buffer of its own: there were more
-// writes that block, and more buffers, than launches. Of those there were twice as many, before one did all
-// levels that bricks try.
+// writes that block, and more buffers, than launches. At a tolerance at which most launches are of levels:
+// one of those has three small arrays.
 BOOST_AUTO_TEST_CASE(a_build_waits_for_few_writes_and_makes_few_buffers) {
   Settings counted = gpu;
   counted["VDVR_SHIM_CALLS"] = files().at("calls");
-  files().build(counted, scans()[0], "counted.vdvr");
+  Scan scan = scans()[0];
+  scan.epsilon = "1%";
+  files().build(counted, scan, "counted.vdvr");
   std::ifstream in(files().at("calls"));
   double launches = 0, blocking = 0, buffers = 0;
   for (double l = 0, w = 0, b = 0; in >> l >> w >> b;) {
@@ -121,8 +123,8 @@ BOOST_AUTO_TEST_CASE(a_build_waits_for_few_writes_and_makes_few_buffers) {
   BOOST_TEST_MESSAGE(launches << " launches, " << blocking << " writes that block, " << buffers
                               << " buffers");
   BOOST_TEST(launches > 100);
-  BOOST_TEST(blocking < 0.75 * launches);
-  BOOST_TEST(buffers < 0.75 * launches);
+  BOOST_TEST(blocking < 0.5 * launches);
+  BOOST_TEST(buffers < 0.6 * launches);
 }
 
 BOOST_AUTO_TEST_CASE(a_texture_unit_of_8_bits_is_charged_for_them) {
