@@ -13,6 +13,7 @@
 #include "tests/support/device.hpp"
 #include "tests/support/fields.hpp"
 #include "tests/support/mixed_volumes.hpp"
+#include "tests/support/places.hpp"
 #include "tests/support/tolerance.hpp"
 
 using namespace vdvr;
@@ -24,7 +25,7 @@ constexpr double u = tolerance::unit_roundoff;
 
 /// The program of certified pictures, and the test's own kernels behind it.
 cl::Program build_steps(int lanes, bool joint) {
-  std::ifstream file(VDVR_SOURCE_DIR "/tests/device/certify_step.cl");
+  std::ifstream file(std::string(vdvr::support::source_dir) + "/tests/device/certify_step.cl");
   std::ostringstream text;
   text << opencl::resolve_source("picture/pixel/pixel_bounds.cl") << file.rdbuf();
   const ResidentVolume any(

@@ -11,13 +11,14 @@
 #include "host/base/opencl/embedded.hpp"
 #include "host/base/opencl/state.hpp"
 #include "tests/support/device.hpp"
+#include "tests/support/places.hpp"
 
 using namespace vdvr;
 
 namespace {
 
 cl::Program build_weights(opencl::State& state) {
-  std::ifstream file(VDVR_SOURCE_DIR "/tests/device/eight_points.cl");
+  std::ifstream file(std::string(vdvr::support::source_dir) + "/tests/device/eight_points.cl");
   std::ostringstream text;
   text << file.rdbuf();
   cl::Program program(state.context, opencl::resolve_source("device/eight_points.h") + text.str());

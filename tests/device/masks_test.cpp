@@ -10,6 +10,7 @@
 #include "host/base/opencl/embedded.hpp"
 #include "host/base/opencl/state.hpp"
 #include "tests/support/device.hpp"
+#include "tests/support/places.hpp"
 
 using namespace vdvr;
 using support::device;
@@ -32,7 +33,7 @@ std::vector<float> patterns(int lanes) {
 }
 
 cl::Program build_questions(opencl::State& state, int lanes) {
-  std::ifstream file(VDVR_SOURCE_DIR "/tests/device/masks.cl");
+  std::ifstream file(std::string(vdvr::support::source_dir) + "/tests/device/masks.cl");
   std::ostringstream text;
   text << file.rdbuf();
   cl::Program program(state.context, opencl::resolve_source("device/lanes.h") + text.str());

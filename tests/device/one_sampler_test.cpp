@@ -16,6 +16,7 @@
 #include "host/volume/validate_volume.hpp"
 #include "tests/support/device.hpp"
 #include "tests/support/mixed_volumes.hpp"
+#include "tests/support/places.hpp"
 
 using namespace vdvr;
 using support::device;
@@ -234,7 +235,7 @@ std::vector<cl_float4> random_points(const MixedVolume& v, unsigned seed, int gr
 // --- sampling ---
 
 cl::Program build_points(const opencl::Defines& defines) {
-  std::ifstream file(VDVR_SOURCE_DIR "/tests/device/one_sampler.cl");
+  std::ifstream file(std::string(vdvr::support::source_dir) + "/tests/device/one_sampler.cl");
   std::ostringstream text;
   text << file.rdbuf();
   const std::string points = text.str();

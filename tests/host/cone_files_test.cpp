@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "tests/support/cone_files.hpp"
+#include "tests/support/places.hpp"
 #include "vdvr/expert/hash.hpp"
 
 using namespace vdvr;
@@ -198,7 +199,7 @@ static void write_distances(const Path& path) {
 // Blocks of docs/inputs.md, "Cone beam", as a user copies them: what begins with '{"proj', '{"hdf5' or
 // '{"nikon' is a scan.json, the others are the files that it names.
 BOOST_AUTO_TEST_CASE(examples_of_the_documentation_are_read) {
-  const std::string text = support::bytes_of(Path(VDVR_SOURCE_DIR) / "docs/inputs.md");
+  const std::string text = support::bytes_of(Path(vdvr::support::source_dir) / "docs/inputs.md");
   std::istringstream lines(text.substr(text.find("## Cone beam\n")));
   std::vector<std::string> blocks;
   std::string line;

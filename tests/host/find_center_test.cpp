@@ -8,6 +8,7 @@
 #include <numbers>
 #include <random>
 
+#include "tests/support/places.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "vdvr/read_scan.hpp"
 
@@ -16,7 +17,7 @@ using namespace vdvr;
 namespace {
 
 constexpr double pi = std::numbers::pi;
-const std::filesystem::path data = std::filesystem::path(VDVR_SOURCE_DIR) / "data";
+const std::filesystem::path data = std::filesystem::path(vdvr::support::source_dir) / "data";
 
 // A tenth of a column is what the published centres of the two real scans claim or better, and moves an edge
 // by a tenth of a sample: below what linear interpolation does to it.

@@ -15,6 +15,7 @@
 
 #include "apps/paper/report.hpp"
 #include "tests/support/device.hpp"
+#include "tests/support/places.hpp"
 #include "tests/support/tolerance.hpp"
 
 using namespace vdvr;
@@ -39,7 +40,8 @@ const json& made() {
   return one;
 }
 const json& recorded() {
-  static const json one = json::parse(contents(fs::path(VDVR_SOURCE_DIR) / "tests/paper/quick.json"));
+  static const json one =
+      json::parse(contents(fs::path(vdvr::support::source_dir) / "tests/paper/quick.json"));
   return one;
 }
 

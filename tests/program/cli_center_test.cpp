@@ -10,13 +10,14 @@
 #include <vector>
 
 #include "tests/support/command_line.hpp"
+#include "tests/support/places.hpp"
 
 using namespace vdvr::support;
 
 namespace {
 
-const std::string tooth = std::string(VDVR_SOURCE_DIR) + "/data/aps-tooth/tooth.h5",
-                  head = std::string(VDVR_SOURCE_DIR) + "/data/cone-head";
+const std::string tooth = std::string(vdvr::support::source_dir) + "/data/aps-tooth/tooth.h5",
+                  head = std::string(vdvr::support::source_dir) + "/data/cone-head";
 
 // What data/README.md gives for the tooth, and done-when 3 of the command: a quarter of a column.
 constexpr double quarter_column = 0.25;

@@ -16,6 +16,7 @@
 #include <random>
 #include <thread>
 
+#include "tests/support/places.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "vdvr/vdvr_file.hpp"
 
@@ -26,7 +27,7 @@ namespace {
 
 /// Starts the program with its messages in a file; its process.
 pid_t start(const std::vector<std::string>& words, const fs::path& messages) {
-  std::vector<std::string> all{VDVR_BINARY};
+  std::vector<std::string> all{vdvr::support::vdvr_binary};
   all.insert(all.end(), words.begin(), words.end());
   std::vector<char*> argv;
   std::transform(all.begin(), all.end(), std::back_inserter(argv), [](std::string& s) { return s.data(); });

@@ -14,6 +14,7 @@
 #include "host/verify/seams.hpp"
 #include "host/verify/verify_field.hpp"
 #include "host/verify/verify_points.hpp"
+#include "tests/support/places.hpp"
 #include "tests/support/scans.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/tolerance.hpp"
@@ -501,7 +502,8 @@ struct Result {
 Result run(const support::TemporaryFolder& folder, const std::string& words) {
   const auto out = folder / "out", err = folder / "err";
   const int status = std::system(
-      (std::string(VDVR_BINARY) + " " + words + " >" + out.string() + " 2>" + err.string()).c_str());
+      (std::string(vdvr::support::vdvr_binary) + " " + words + " >" + out.string() + " 2>" + err.string())
+          .c_str());
   return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, support::bytes_of(out), support::bytes_of(err)};
 }
 

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/places.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace vdvr::support {
@@ -27,7 +28,7 @@ class Program {
   /// stdout and stderr go to files in `folder`.
   explicit Program(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
-  std::string binary = VDVR_BINARY;
+  std::string binary = vdvr_binary;
   /// Environment of the next runs, beside the test's own.
   std::map<std::string, std::string> environment;
   /// Called in the child before the program takes over.

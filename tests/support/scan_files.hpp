@@ -14,6 +14,7 @@
 #include <numbers>
 
 #include "host/files/io/tiff.hpp"
+#include "tests/support/places.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/tolerance.hpp"
 #include "vdvr/error.hpp"
@@ -24,7 +25,7 @@ namespace vdvr::support {
 using Path = std::filesystem::path;
 using Shape = std::vector<hsize_t>;
 
-inline const Path data = Path(VDVR_SOURCE_DIR) / "data";
+inline const Path data = Path(source_dir) / "data";
 inline constexpr double pi = std::numbers::pi;
 
 // The message of the InputError or FileError that reading must end with; any other exception fails the test.
