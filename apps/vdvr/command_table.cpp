@@ -13,7 +13,7 @@ std::vector<Command> commands_of_scans() {
        .run = simulate_command,
        .main_options = {"output", "phantom", "volume", "angles", "arc", "detector", "pitch", "photons",
                         "cone", "help"},
-       .examples = {{"vdvr simulate --phantom shepp-logan --photons 5000 -o scan.h5",
+       .examples = {{"vdvr simulate --phantom shepp-logan --pitch .05 --photons 5000 -o scan.h5",
                      "counts of 5,000 photons a pixel, with flats and darks"},
                     {"vdvr simulate --phantom sphere --cone 60,90 -o scan",
                      "cone beam: the source 60 from the axis and 90 from the detector"}}},

@@ -191,6 +191,8 @@ CASES = [
     ("simulate --phantom ell.json -o o.h5", ["ell.json", "'ellipsoids[0].center'", "three numbers"]),
     ("simulate --phantom sphere --angles 0 -o o.h5", ["--angles", "0", "between 1"]),
     ("simulate --phantom sphere --detector 5 -o o.h5", ["--detector", "'5'", "2 sizes"]),
+    ("simulate --phantom shepp-logan --detector 65x33 --angles 20 --photons 500 -o o.h5",
+     ["--photons 500", "line integrals", "no photon", "--pitch"]),
     ("simulate --volume scan.h5 -o o.h5", ["scan.h5", "not a volume", ".mha"]),
     ("bench foo", ["'foo'", "fbp"]),
     ("bench", ["fbp", "render"]),

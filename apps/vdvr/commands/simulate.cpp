@@ -199,6 +199,22 @@ std::optional<PhotonCounts> photon_counts(const Arguments& args, const SimulateO
   return counts;
 }
 
+/// Refuses what read_scan would call dead. Poisson's variate of a mean m is 0 with a probability of e^-m.
+void require_light(const ProjectionSet& scan, double photons) {
+  double dark = 0, largest = 0;
+  for (const float p : scan.data) {
+    dark += std::exp(-photons * std::exp(-static_cast<double>(p)));
+    largest = std::max(largest, static_cast<double>(p));
+  }
+  dark /= static_cast<double>(scan.data.size());
+  if (3 * dark < 1) return;
+  throw InputError(fmt::format(
+      "--photons {:g}: line integrals reach {:.3g}, and {:.0f} % of the pixels would count no photon; take a "
+      "smaller --pitch (line integrals of built-in phantoms are multiples of it), an object of smaller "
+      "densities, or more photons",
+      photons, largest, 100 * dark));
+}
+
 /// Built-in phantoms fill the detector: half of its width is 32 sqrt(2) / sqrt(2) pixels for the usual
 /// Marschner-Lobb set-up and one unit of Shepp-Logan for its own (docs/phantoms.md).
 Phantom phantom_for(Setup& setup) {
@@ -244,6 +260,7 @@ int simulate_command(Arguments& args) {
   const Phantom phantom = phantom_for(setup);
   const ProjectionSet scan = simulate(phantom, setup.scan, progress.callback());
   throw_if_stopped();
+  if (counts) require_light(scan, counts->photons);
   if (folder) {
     folder->begin();
     write_cone_scan(output, scan, setup.scan, counts);
