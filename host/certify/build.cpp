@@ -394,6 +394,7 @@ BuildResult build_in_units(Device& device, const ScanInUnits& of_scan, Plan plan
   watch.lap("filter");
   GoldSettings settings = gold_settings(plan, plan.rates, scan.cone.has_value());
   settings.window = options.window;
+  settings.of_noise = options.refinement && !options.refinement->by_brick.empty();
   // That closing knows no levels per axis.
   if (plan.settings.comparison.closing == Closing::paper) settings.anisotropic = false;
   std::optional<Crew> crew;

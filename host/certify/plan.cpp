@@ -293,6 +293,7 @@ class Planner {
   [[nodiscard]] bool grid_only() const { return plan_.settings.comparison.terms == Terms::grid; }
   [[nodiscard]] GoldSettings settings_at(const Rates& r) const {
     GoldSettings settings = gold_settings(plan_, r, is_cone());
+    settings.of_noise = !by_brick_.empty();
     if (sampled_) settings.part = sampled_->part();
     return settings;
   }

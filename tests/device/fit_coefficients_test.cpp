@@ -71,11 +71,15 @@ struct Blocks {
 class Reference {
  public:
   Reference(const Blocks& blocks, std::int64_t block, const Index3& spacing, const Index3& first,
-            const Index3& last, int steps)
-      : blocks_(blocks), block_(block), spacing_(spacing), first_(first) {
+            const Index3& last, const FitSteps& steps)
+      : blocks_(blocks),
+        block_(block),
+        spacing_(spacing),
+        first_(first),
+        share_(static_cast<double>(steps.share)) {
     for (std::size_t a = 0; a < 3; ++a) count_[a] = last[a] - first[a] + 1;
     for_each([&](const Index3& i) { samples_.push_back(gold(node(i))); });
-    for (int step = 0; step < steps; ++step) fit();
+    for (int step = 0; step < steps.count; ++step) fit();
   }
   [[nodiscard]] double operator()(const Index3& n) const {
     Index3 i{};
@@ -162,7 +166,7 @@ class Reference {
         smallest = std::min(smallest, e);
         largest = std::max(largest, e);
       }
-      if (smallest <= largest) moved[place(i)] -= 0.8 * 0.5 * (smallest + largest);
+      if (smallest <= largest) moved[place(i)] -= 0.5 * share_ * (smallest + largest);
     });
     samples_ = std::move(moved);
   }
@@ -170,6 +174,7 @@ class Reference {
   const Blocks& blocks_;
   std::int64_t block_;
   Index3 spacing_, first_, count_{};
+  double share_;
   std::vector<double> samples_;
 };
 
@@ -225,14 +230,14 @@ struct Slack {
 };
 
 // Samples that lie around a brick's own: what steps read, as far as there is gold.
-Reference of_tile(const Blocks& blocks, const TileToFit& tile, int steps) {
+Reference of_tile(const Blocks& blocks, const TileToFit& tile, const FitSteps& steps) {
   const GoldBlocks& s = blocks.shape;
   const Index3 nodes{s.nx, s.ny, s.nz};
   Index3 first{}, last{};
   for (std::size_t a = 0; a < 3; ++a) {
     const std::int64_t spacing = tile.spacing[a], own = tile.node[a] / spacing,
                        end = std::min(tile.node[a] + side, nodes[a] - 1) / spacing,
-                       around = spacing > 1 ? steps : 0;
+                       around = spacing > 1 ? steps.count : 0;
     first[a] = std::max(own - around, -(halo / spacing));
     last[a] = std::min(end + around, (nodes[a] - 1 + halo) / spacing);
   }
@@ -240,7 +245,8 @@ Reference of_tile(const Blocks& blocks, const TileToFit& tile, int steps) {
 }
 
 // The tiles' samples and what their nodes are found to err by, against the reference.
-void compare(const Blocks& blocks, const std::vector<TileToFit>& tiles, int steps) {
+void compare(const Blocks& blocks, const std::vector<TileToFit>& tiles, const FitSteps& fit_steps) {
+  const int steps = fit_steps.count;
   opencl::State& state = device().state();
   const OnDevice on(blocks);
   const VdvrGoldShape shape = shape_of(blocks.shape);
@@ -250,13 +256,13 @@ void compare(const Blocks& blocks, const std::vector<TileToFit>& tiles, int step
   TileFit fit(state);
   const auto errors =
       fit({on.gold, on.margin, above, below, shape, blocks.shape.z_first, blocks.shape.z_last}, tiles, side,
-          steps, curvature, true);
+          fit_steps, true);
   const std::vector<float> samples = fit.samples().to_host();
   BOOST_TEST_REQUIRE(errors.size() == tiles.size());
   double moved = 0;
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     const TileToFit& t = tiles[i];
-    const Reference reference = of_tile(blocks, t, steps);
+    const Reference reference = of_tile(blocks, t, fit_steps);
     const Index3 end{t.node[0] + side, t.node[1] + side, std::min(t.node[2] + side, blocks.shape.nz - 1)};
     const TileFit::Place place = fit.place(i);
     double worst = 0, total = -1;
@@ -288,7 +294,8 @@ BOOST_AUTO_TEST_CASE(tiles_of_any_level_are_those_of_the_fit_in_double_precision
   for (const int steps : {0, 1, level_fit_steps}) {
     std::vector<TileToFit> tiles;
     for (const Index3& spacing : spacings) tiles.push_back({1, {0, 0, 32}, spacing});
-    compare(blocks, tiles, steps);
+    for (const float share : {smooth_fit_share, noise_fit_share})
+      compare(blocks, tiles, {steps, share, curvature});
   }
 }
 
@@ -297,7 +304,7 @@ BOOST_AUTO_TEST_CASE(tiles_at_the_rim_of_what_is_tested_are_fitted_to_the_rest) 
   blocks.cut();
   std::vector<TileToFit> tiles;
   for (const Index3& spacing : spacings) tiles.push_back({0, {0, 0, 32}, spacing});
-  compare(blocks, tiles, level_fit_steps);
+  compare(blocks, tiles, {level_fit_steps, smooth_fit_share, curvature});
 }
 
 // The grid ends at node 112 of the blocks.
@@ -307,7 +314,7 @@ BOOST_AUTO_TEST_CASE(tiles_that_end_with_the_grid_have_the_samples_that_there_ar
   blocks.shape.z_last = 112;
   std::vector<TileToFit> tiles;
   for (const Index3& spacing : spacings) tiles.push_back({1, {0, 0, 96}, spacing});
-  compare(blocks, tiles, level_fit_steps);
+  compare(blocks, tiles, {level_fit_steps, smooth_fit_share, curvature});
 }
 
 BOOST_AUTO_TEST_CASE(tiles_that_do_not_fit_together_are_split) {
@@ -327,7 +334,7 @@ BOOST_AUTO_TEST_CASE(base_samples_after_many_steps_are_those_in_double_precision
   const Index3 spacing{2, 2, 2}, first{-halo / 2, -halo / 2, -halo / 2},
       last{(blocks.shape.nx - 1 + halo) / 2, (blocks.shape.ny - 1 + halo) / 2,
            (blocks.shape.nz - 1 + halo) / 2};
-  const Reference reference(blocks, 1, spacing, first, last, steps);
+  const Reference reference(blocks, 1, spacing, first, last, {steps, fit_share, curvature});
   BaseFit fit(device().state(), blocks.shape);
   const std::vector<NodeBox> boxes{{1, {0, 0, 32}, {8, 8, 64}}, {1, {16, 8, 32}, {24, 24, 64}}};
   const BaseLattice& base = fit(on.gold, on.margin, boxes, steps, curvature);

@@ -74,12 +74,16 @@ namespace {
 constexpr const char* kept_programs = "programs";
 constexpr std::uintmax_t most_kept = 64 << 20;
 
-// All that a binary depends on; none where it is not to be kept. PoCL reads a program with all of the
-// language's functions before it looks into its own cache: 20 to 60 ms each, of which a command asks for 20
-// or more. Intel's runtime for CPUs has none. Drivers of GPUs have their own.
+// All that a binary depends on; none where it is not to be kept. Intel's runtime for CPUs has no cache of its
+// own. PoCL has one, of kernels, and spends 20 to 60 ms a program before it looks there; but to hand a binary
+// out it compiles every kernel of the program once more, for groups of any size: what takes half a minute the
+// first time takes a whole one. So PoCL is asked only where the user wants it. Drivers of GPUs have caches.
 std::string binary_head(const State& state, const std::string& source, const std::string& options) {
-  const bool pays =
-      state.info.platform == pocl_platform || (state.info.is_cpu && state.info.platform.starts_with("Intel"));
+  const char* cache = std::getenv("VDVR_CACHE");
+  const bool wanted = cache != nullptr && std::string_view(cache) == "programs";
+  const bool pays = state.info.platform == pocl_platform
+                        ? wanted
+                        : state.info.is_cpu && state.info.platform.starts_with("Intel");
   if (!pays || behind_a_layer()) return {};
   const char* flags = std::getenv("POCL_EXTRA_BUILD_FLAGS");
   return "vdvr: a program of kernels\n" + identity(state) + sha256_of_text(source) + '\n' + options + '\n' +

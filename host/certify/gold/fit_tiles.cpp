@@ -7,7 +7,6 @@
 #include "host/base/opencl/work_groups.hpp"
 #include "host/base/opencl/write_later.hpp"
 #include "host/base/system/casts.hpp"
-#include "host/certify/gold/fit_base.hpp"
 
 namespace vdvr {
 
@@ -82,12 +81,12 @@ std::size_t TileFit::together(const TestedGold& gold, std::span<const TileToFit>
 }
 
 std::vector<float> TileFit::operator()(const TestedGold& gold, std::span<const TileToFit> tiles,
-                                       std::int64_t side, int steps, float curvature, bool tested) {
+                                       std::int64_t side, const FitSteps& steps, bool tested) {
   tiles_.clear();
-  steps_ = steps;
+  steps_ = steps.count;
   std::uint64_t room = 0;
   for (const TileToFit& tile : tiles) {
-    tiles_.push_back(shape_of(gold.shape, tile, side, steps));
+    tiles_.push_back(shape_of(gold.shape, tile, side, steps.count));
     tiles_.back().room = room;
     room += room_of(tiles_.back(), side);
   }
@@ -106,7 +105,8 @@ std::vector<float> TileFit::operator()(const TestedGold& gold, std::span<const T
   kernel(opencl::shared_groups(state_.info, {tiles.size(), 1, 1}), errors.buffer(), room_.buffer(),
          on_device.buffer(), to_int(static_cast<std::int64_t>(tiles.size())), gold.gold.buffer(),
          gold.above.buffer(), gold.below.buffer(), gold.margin.buffer(), gold.shape, to_int(gold.z_first),
-         to_int(gold.z_last), steps, tested ? 1 : 0, curvature, fit_share, opencl::shared_room(state_.info));
+         to_int(gold.z_last), steps.count, tested ? 1 : 0, steps.curvature, steps.share,
+         opencl::shared_room(state_.info));
   return tested ? errors.to_host() : std::vector<float>{};
 }
 

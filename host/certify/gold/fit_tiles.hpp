@@ -15,6 +15,17 @@ namespace vdvr {
 
 /// Samples of finer levels than the base's hardly gain after two steps.
 constexpr int level_fit_steps = 2;
+/// What a step takes of the middle of the errors around a sample (docs/error-bounds.md, section 13): of a
+/// smooth field little, since neighbours of other levels, whose samples do not move with a brick's, agree
+/// less; where bricks have tolerances of their own, which are those of noise, more than all.
+constexpr float smooth_fit_share = 0.8f, noise_fit_share = 1.2f;
+
+/// How tiles are fitted.
+struct FitSteps {
+  int count = level_fit_steps;     ///< 0: gold at the nodes
+  float share = smooth_fit_share;  ///< of the middle of the errors
+  float curvature = 0;             ///< as BaseFit's
+};
 
 /// Blocks of gold with their slack, on the device: layouts as in kernels/certify/gold/node_slack.cl.
 struct TestedGold {
@@ -34,13 +45,12 @@ class TileFit {
  public:
   explicit TileFit(opencl::State& state) : state_(state) {}
 
-  /// Samples of these tiles, fitted in so many steps; `steps` = 0: gold at the nodes. `side`: nodes of a
-  /// brick, less one. `curvature` as BaseFit's. With `tested`, returns the largest that |interpolant - F| may
-  /// be at the nodes of each brick, negative where none is tested. Samples stay until the next call. One
-  /// launch. Cost: a step has 27 evaluations of the interpolant per sample of the brick and around it, the
-  /// test one a node.
+  /// Samples of these tiles. `side`: nodes of a brick, less one. With `tested`, returns the largest that
+  /// |interpolant - F| may be at the nodes of each brick, negative where none is tested. Samples stay until
+  /// the next call. One launch. Cost: a step has 27 evaluations of the interpolant per sample of the brick
+  /// and around it, the test one a node.
   std::vector<float> operator()(const TestedGold& gold, std::span<const TileToFit> tiles, std::int64_t side,
-                                int steps, float curvature, bool tested);
+                                const FitSteps& steps, bool tested);
 
   /// How many of these tiles, from the first on, fit into so many floats: one at least.
   [[nodiscard]] static std::size_t together(const TestedGold& gold, std::span<const TileToFit> tiles,

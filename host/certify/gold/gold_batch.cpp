@@ -253,12 +253,14 @@ void GoldBatch::fit_tiles(Tiles tiles, bool tested, const OnFitted& visit) {
     const auto [b, x, y, z] = place(brick);
     asked.push_back({b, {x * side(), y * side(), z * side()}, spacing_of(level)});
   }
-  const int steps = settings_.midrange ? level_fit_steps : 0;
+  const FitSteps steps{settings_.midrange ? level_fit_steps : 0,
+                       settings_.of_noise ? noise_fit_share : smooth_fit_share,
+                       of_curvature_ * settings_.curvature};
   std::span<const TileToFit> rest(asked);
   while (!rest.empty()) {
-    const auto part = rest.first(TileFit::together(gold, rest, side(), steps, gold_.size()));
+    const auto part = rest.first(TileFit::together(gold, rest, side(), steps.count, gold_.size()));
     const auto first = asked.size() - rest.size();
-    const auto errors = tile_fit_(gold, part, side(), steps, of_curvature_ * settings_.curvature, tested);
+    const auto errors = tile_fit_(gold, part, side(), steps, tested);
     visit(first, part.size(), errors);
     rest = rest.subspan(part.size());
   }

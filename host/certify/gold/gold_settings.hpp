@@ -31,6 +31,7 @@ struct GoldSettings {
   Interpolation interpolation = Interpolation::linear;
   std::optional<std::pair<double, double>> window{};
   bool midrange = false;     ///< samples fitted to the trilinear filter; else gold at the nodes
+  bool of_noise = false;     ///< bricks have tolerances of their own: fits take larger steps (fit_tiles.hpp)
   bool anisotropic = false;  ///< levels per axis; else one for all three
   bool base_only = false;    ///< only fitted base samples are asked for: no slack, no other level
   /// Of gold's second differences: the middle of the T that they stand for, an eighth at most in a cell.
