@@ -7,6 +7,8 @@
 // the field a compiler that we never saw may warn of what is right.
 #include <fmt/format.h>
 
+#include <atomic>
+#include <chrono>
 #include <cstdlib>
 #include <optional>
 #include <set>
@@ -74,16 +76,12 @@ namespace {
 constexpr const char* kept_programs = "programs";
 constexpr std::uintmax_t most_kept = 64 << 20;
 
-// All that a binary depends on; none where it is not to be kept. Intel's runtime for CPUs has no cache of its
-// own. PoCL has one, of kernels, and spends 20 to 60 ms a program before it looks there; but to hand a binary
-// out it compiles every kernel of the program once more, for groups of any size: what takes half a minute the
-// first time takes a whole one. So PoCL is asked only where the user wants it. Drivers of GPUs have caches.
+// All that a binary depends on; none where it is not to be kept. PoCL reads a program with all of the
+// language's functions before it looks into its own cache: 20 to 60 ms each, of which a command asks for 20
+// or more. Intel's runtime for CPUs has none. Drivers of GPUs have their own.
 std::string binary_head(const State& state, const std::string& source, const std::string& options) {
-  const char* cache = std::getenv("VDVR_CACHE");
-  const bool wanted = cache != nullptr && std::string_view(cache) == "programs";
-  const bool pays = state.info.platform == pocl_platform
-                        ? wanted
-                        : state.info.is_cpu && state.info.platform.starts_with("Intel");
+  const bool pays =
+      state.info.platform == pocl_platform || (state.info.is_cpu && state.info.platform.starts_with("Intel"));
   if (!pays || behind_a_layer()) return {};
   const char* flags = std::getenv("POCL_EXTRA_BUILD_FLAGS");
   return "vdvr: a program of kernels\n" + identity(state) + sha256_of_text(source) + '\n' + options + '\n' +
@@ -112,15 +110,38 @@ std::optional<cl::Program> remembered(const State& state, const std::string& hea
   }
 }
 
-void remember(const cl::Program& program, const std::string& head) {
+// To hand a binary out PoCL compiles every kernel of the program once more, for groups of any size: that
+// takes some twenty times what the binary spares a process. So it is asked for the binary of a program that
+// as many processes have built already, and a process spends a second on binaries, and what the last one
+// takes beyond.
+constexpr int processes_before = 8;
+constexpr std::chrono::seconds most_spent{1};
+
+// A letter in a file for each process that built the program, this one included.
+bool is_built_often(const std::string& head) {
+  const std::string name = file_of(head) + ".built", before = read_cached(name).value_or("");
+  if (before.size() >= processes_before) return true;
+  write_cached(name, before + "x");
+  return false;
+}
+
+void remember(const State& state, const cl::Program& program, const std::string& head) {
   if (head.empty()) return;
+  static std::atomic<std::chrono::steady_clock::duration> spent{};
+  const char* cache = std::getenv("VDVR_CACHE");
+  const bool at_once =
+      state.info.platform != pocl_platform || (cache != nullptr && std::string_view(cache) == "programs");
+  if (!at_once && (!is_built_often(head) || spent.load() > most_spent)) return;
+  const auto start = std::chrono::steady_clock::now();
   try {
     const auto binaries = program.getInfo<CL_PROGRAM_BINARIES>();
-    if (binaries.size() != 1 || binaries[0].empty()) return;
-    write_cached(file_of(head), sealed(head + std::string(binaries[0].begin(), binaries[0].end())));
-    forget_oldest(kept_programs, most_kept);
+    if (binaries.size() == 1 && !binaries[0].empty()) {
+      write_cached(file_of(head), sealed(head + std::string(binaries[0].begin(), binaries[0].end())));
+      forget_oldest(kept_programs, most_kept);
+    }
   } catch (const cl::Error&) {  // no binary to be had
   }
+  if (!at_once) spent = spent.load() + (std::chrono::steady_clock::now() - start);
 }
 
 }  // namespace
@@ -157,7 +178,7 @@ const cl::Program& State::built(const std::string& name, const Defines& defines)
     throw BuildError(fmt::format("kernel program '{}' does not build on '{}' with options '{}': {} {}\n{}",
                                  name, info.name, options, e.what(), code_name(e.err()), log));
   }
-  remember(program, head);
+  remember(*this, program, head);
   const std::lock_guard guard(programs_lock_);
   return programs_.emplace(key, std::move(program)).first->second;
 }
