@@ -13,13 +13,13 @@ import threading
 import time
 
 
-def run_chunk(program, first, count, limit, done):
+def run_chunk(command, first, count, limit, done):
     """Seeds first .. first + count - 1, handing each record to `done`; a process that ends early or says nothing for
     `limit` seconds names its seed, and another one goes on behind it."""
     end = first + count
     while first < end:
-        process = subprocess.Popen([program, str(end - first), str(first), "--json"], stdout=subprocess.PIPE,
-                                   stderr=subprocess.DEVNULL)
+        process = subprocess.Popen(command + [str(end - first), str(first), "--json"],
+                                   stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
         text, hangs, told = b"", False, time.monotonic()
         while True:
             ready, _, _ = select.select([process.stdout], [], [], max(0.0, told + limit - time.monotonic()))
@@ -66,6 +66,7 @@ def run(parser, print_failures):
         sys.exit("%s is missing: cmake --build build --target %s" %
                  (options.program, os.path.basename(options.program)))
     log = open(options.log, "w") if options.log else None
+    command = [options.program] + (["--cone"] if getattr(options, "cone", False) else [])
     records, lock, work = [], threading.Lock(), queue.Queue()
     for first in range(options.first, options.first + options.count, options.chunk):
         work.put((first, min(options.chunk, options.first + options.count - first)))
@@ -86,7 +87,7 @@ def run(parser, print_failures):
                 first, count = work.get_nowait()
             except queue.Empty:
                 return
-            run_chunk(options.program, first, count, options.limit, done)
+            run_chunk(command, first, count, options.limit, done)
 
     start = time.monotonic()
     workers = [threading.Thread(target=worker) for _ in range(options.jobs)]

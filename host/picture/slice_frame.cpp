@@ -70,7 +70,10 @@ std::string bar_label(const SliceFrame& f, const FrameLayout& l) {
 }
 
 std::string title(const SliceFrame& f, const FrameLayout& l) {
-  return fmt::format("{} = {} {}", "xyz"[f.axis], number_text(f.position * l.across.factor), l.unit);
+  // The middle of a grid around 0, but for what sums round.
+  const bool is_zero = std::abs(f.position) < 1e-9 * f.grid.spacing[static_cast<std::size_t>(f.axis)];
+  return fmt::format("{} = {} {}", "xyz"[f.axis], number_text(is_zero ? 0 : f.position * l.across.factor),
+                     l.unit);
 }
 
 /// Round values between the ends of the window, which stand there as they are.

@@ -381,7 +381,8 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
   require_trusted(device, "verifying a certificate");
   ParallelGeometry used = scan.geometry;
   used.center = center_of(stored.field, used);
-  check_scan(used);
+  if (scan.cone) check_scan(scan);
+  else check_scan(used);
   // Weights at most double the columns of a displaced detector.
   const std::uint64_t padded = scan.cone && scan.cone->redundancy == Redundancy::displaced ? 2 : 1;
   const std::uint64_t all = padded * static_cast<std::uint64_t>(scan.size()) * sizeof(double);

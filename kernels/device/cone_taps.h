@@ -1,4 +1,4 @@
-// What both forms of the kept nodes of cone beam share: a view as the host gives it, and eight taps of a
+// What the kernels of the kept nodes of cone beam share: a view as the host gives it, and eight taps of a
 // place.
 #ifndef VDVR_CONE_TAPS_H
 #define VDVR_CONE_TAPS_H
@@ -48,6 +48,21 @@ static inline __attribute__((always_inline)) float16 taps_of_two(float16 g) {
              VDVR_TAPS_FUSED_HORNER(float16, s, TWICE(EVEN_OF(FIRST_OF)), TWICE(EVEN_OF(SECOND_OF)),
                                     TWICE(EVEN_OF(THIRD_OF))));
 }
+
+// Eight columns of eight rows, weighed.
+#define COLUMN(j) vload8(0, from + (size_t)(j)*stride)
+static inline __attribute__((always_inline)) float8 across_columns(__global const float* from, int stride,
+                                                                   float8 weight) {
+  float8 left = (float8)(weight.s0) * COLUMN(0), right = (float8)(weight.s7) * COLUMN(7);
+  left = fma((float8)(weight.s1), COLUMN(1), left);
+  right = fma((float8)(weight.s6), COLUMN(6), right);
+  left = fma((float8)(weight.s2), COLUMN(2), left);
+  right = fma((float8)(weight.s5), COLUMN(5), right);
+  left = fma((float8)(weight.s3), COLUMN(3), left);
+  right = fma((float8)(weight.s4), COLUMN(4), right);
+  return left + right;
+}
+#undef COLUMN
 
 static inline __attribute__((always_inline)) float sum_of(float8 v) {
   const float4 four = v.lo + v.hi;

@@ -341,7 +341,7 @@ struct Table {
 int main(int argc, char** argv) {
   const auto arguments = support::seed_arguments(argc, argv, "cone_attacks");
   if (!arguments) return 2;
-  const auto [first, end, json, verbose] = *arguments;
+  const auto [first, end, json, verbose, cone] = *arguments;
 
   Device device;
   Table table;

@@ -2,13 +2,14 @@
 // 1e-12 to 1e12 and densities from 1e-36 to 1e36, built, and its certificate held to the truth in double
 // (tests/support/hostile_check.hpp). CTest runs a short form; scripts/hostile-builds runs thousands in many
 // processes and names the seed of one that died.
-//   hostile_builds COUNT [FIRST_SEED] [--json] [--verbose]
+//   hostile_builds COUNT [FIRST_SEED] [--json] [--verbose] [--cone]
 
 #include <cstdio>
 #include <map>
 #include <nlohmann/json.hpp>
 
 #include "tests/support/hostile_check.hpp"
+#include "tests/support/hostile_cone.hpp"
 #include "tests/support/seed_arguments.hpp"
 
 using namespace vdvr;
@@ -91,15 +92,15 @@ struct Table {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const auto arguments = support::seed_arguments(argc, argv, "hostile_builds");
+  const auto arguments = support::seed_arguments(argc, argv, "hostile_builds", true);
   if (!arguments) return 2;
-  const auto [first, end, json, verbose] = *arguments;
+  const auto [first, end, json, verbose, cone] = *arguments;
 
   Device device;
   Table table;
   for (std::uint64_t seed = first; seed < end; ++seed) {
     const auto start = detail::Clock::now();
-    const Case c = draw_case(seed);
+    const Case c = cone ? draw_cone(seed) : draw_case(seed);
     if (verbose)
       std::fprintf(stderr, "seed %llu: %s\n", static_cast<unsigned long long>(seed), text_of_case(c).c_str());
     const Report r = run_case(device, c, seed);

@@ -461,6 +461,18 @@ BOOST_AUTO_TEST_CASE(certificates_of_other_views_are_refused_by_name) {
   BOOST_TEST(names(parallel.differences, "parallel beam, not of cone beam"));
 }
 
+// An axis near the detector's edge is half acquisition in parallel beam; of cone beam weights make up for it.
+BOOST_AUTO_TEST_CASE(a_detector_far_off_the_axis_verifies) {
+  const ProjectionSet scan =
+      noisy_cone({.views = 20, .rows = 4, .columns = 24, .source_to_axis = 150, .shift = 7.5});
+  BOOST_REQUIRE((scan.cone->redundancy == Redundancy::displaced));
+  const BuildResult result = certify(support::device(), scan, Tolerance{.relative = 0.5});
+  VerifyOptions options;
+  options.exhaustive = true;
+  const VerifyResult r = verify(support::device(), scan, result.volume, result.certificate, options);
+  BOOST_TEST(r.holds, r.failure);
+}
+
 // A certificate that says more than is so: of the terms that build's own code makes again.
 BOOST_AUTO_TEST_CASE(edited_terms_are_told) {
   const auto changed = [&](const auto& change) {

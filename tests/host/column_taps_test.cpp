@@ -6,6 +6,7 @@
 #include <array>
 #include <boost/test/unit_test.hpp>
 #include <cmath>
+#include <complex>
 #include <numbers>
 #include <vector>
 
@@ -94,6 +95,59 @@ BOOST_AUTO_TEST_CASE(norm_and_slope_hold_for_any_columns_and_are_reached) {
 }
 
 // Coefficients of a pair of taps, evaluated as devices do.
+// Sum of weights times h at the taps, less h(0), at a place f.
+template <class Of>
+std::complex<double> error_at_place(const ColumnTaps& facts, double f, const Of& h) {
+  std::complex<double> sum = -h(0.0);
+  const std::vector<double> w = weights(facts, f);
+  for (std::size_t i = 0; i < w.size(); ++i) sum += w[i] * h(first(facts, f) + static_cast<double>(i));
+  return sum;
+}
+
+BOOST_AUTO_TEST_CASE(moments_of_waves_stay_below_theirs) {
+  for (const ColumnTaps* facts : both) {
+    std::array<double, 2> reached{};
+    for (int k = 0; k <= 100; ++k)
+      for (int s = 0; s <= 200; ++s)
+        for (int n = 1; n <= 2; ++n) {
+          const auto h = [&](double y) {
+            return std::pow(y, n) * std::polar(1.0, facts->band * k / 100 * y);
+          };
+          double& most = reached[static_cast<std::size_t>(n - 1)];
+          most = std::max(most, std::abs(error_at_place(*facts, s / 200.0, h)));
+        }
+    for (std::size_t n = 0; n < 2; ++n) {
+      BOOST_TEST_MESSAGE(facts->taps << " taps, moment " << n + 1 << ": " << reached[n] << " of "
+                                     << facts->moments[n]);
+      BOOST_TEST(reached[n] <= facts->moments[n]);
+      BOOST_TEST(facts->moments[n] < 0.02);  // magnitudes alone give .9 and more
+    }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(waves_whose_scale_changes_err_no_more_than_is_charged) {
+  for (const ColumnTaps* facts : both)
+    for (const double tau : {1e-7, 1e-5, 1e-3, 0.01, 0.05})
+      for (const double sign : {1.0, -1.0}) {
+        double more = 0;
+        for (int k = 0; k <= 50; ++k)
+          for (int s = 0; s <= 100; ++s) {
+            const double kappa = facts->band * k / 50, t = sign * tau;
+            const auto still = [&](double y) { return std::polar(1.0, kappa * y); };
+            const auto moving = [&](double y) {
+              return std::polar(1 / ((1 + t * y) * (1 + t * y)), kappa * y / (1 + t * y));
+            };
+            more = std::max(more, std::abs(error_at_place(*facts, s / 100.0, moving) -
+                                           error_at_place(*facts, s / 100.0, still)));
+          }
+        BOOST_TEST_MESSAGE(facts->taps << " taps, tau " << sign * tau << ": " << more << " of "
+                                       << facts->error_of_wedge(sign * tau));
+        BOOST_TEST(more <= facts->error_of_wedge(sign * tau) + tolerance::fp64_sum(10, 2));
+      }
+  BOOST_TEST(eight_tap_facts().error_of_wedge(0) == 0);
+  BOOST_TEST(std::isinf(eight_tap_facts().error_of_wedge(0.2)));
+}
+
 template <std::size_t N>
 void check_rounding(const ColumnTaps& facts, const std::array<std::array<float, 3>, N>& even,
                     const std::array<std::array<float, 3>, N>& odd) {

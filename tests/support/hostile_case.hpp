@@ -80,6 +80,13 @@ inline Inputs inputs_at(const Case& c, const Scale& s) {
   ParallelGeometry& g = in.scan.geometry;
   g.pitch_u *= s.pitch_u;
   g.pitch_v *= s.pitch_v;
+  if (in.scan.cone) {
+    for (ViewMatrix& m : in.scan.cone->views)
+      for (std::size_t row = 0; row < 3; ++row)
+        for (std::size_t a = 0; a < 3; ++a)
+          m[row][a] /= s.pitch_u;  // of cone beam one factor for all lengths
+    g = parallel_limit(*in.scan.cone, g.columns, g.rows, g.unit);
+  }
   const double integral = s.density * s.pitch_u;
   for (float& p : in.scan.data) {
     const double exact = static_cast<double>(p) * integral;

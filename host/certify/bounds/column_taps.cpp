@@ -116,6 +116,24 @@ void bound_sums(ColumnTaps& facts, const Polynomials& p) {
   }
 }
 
+// The moments' largest sums over f in [0, 1]: at steps, and between them by their second derivatives, sums of
+// magnitudes.
+std::array<double, 2> bound_moments(const Polynomials& p, double band) {
+  const double farthest = 0.5 * static_cast<double>(p.taps());
+  std::array<double, 3> magnitudes{};  // of derivatives of the weights, by order
+  for (std::size_t order = 0; order < 3; ++order)
+    for (std::size_t tap = 0; tap < p.taps(); ++tap)
+      magnitudes[order] += largest_derivative(p, tap, tap, order);
+  std::array<double, 2> out{};
+  for (int s = 0; s <= steps_of_half; ++s) {
+    const std::vector<double> found = moment_sup_constants(functional(p, apart * s, 0), band, 3);
+    for (std::size_t n = 0; n < 2; ++n) out[n] = std::max(out[n], found[n + 1]);
+  }
+  out[0] += bend * (farthest * magnitudes[2] + 2 * magnitudes[1]);
+  out[1] += bend * (farthest * farthest * magnitudes[2] + 4 * farthest * magnitudes[1] + 2 * magnitudes[0]);
+  return out;
+}
+
 // a + s (b + s c), |s| <= 1/4 with an error of one rounding, in units of u: the magnitudes that each rounding
 // is of. A compiler that fuses takes fewer.
 double horner_rounding(double a, double b, double c) {
@@ -145,6 +163,7 @@ ColumnTaps compute_facts(const Polynomials& p, double band) {
   facts.error =
       over_all_places(p, band, [&](const NodeFunctional& at) { return largest_symbol_error(at, band); });
   facts.sup = over_all_places(p, band, [&](const NodeFunctional& at) { return sup_constant(at, band); });
+  facts.moments = bound_moments(p, band);
   facts.rounding = weights_rounding(p);
   bound_sums(facts, p);
   return facts;
@@ -154,6 +173,16 @@ ColumnTaps compute_facts(const Polynomials& p, double band) {
 
 std::vector<double> six_taps(double f) { return derivatives(of_six(), f, 0); }
 std::vector<double> eight_taps(double f) { return derivatives(of_eight(), f, 0); }
+
+// With z = y / (1 + tau y) it is (z / y)^2 q(z), whose first derivative by tau is -(y^2 q)' at tau = 0, and
+// the second (z / y)^2 (6 z^2 q + 6 z^3 q' + z^4 q'') anywhere. q' and q'' have at most band and band^2 of q.
+double ColumnTaps::error_of_wedge(double tau) const {
+  const double t = std::abs(tau), reach = 0.5 * static_cast<double>(taps), room = 1 - t * reach;
+  if (!(room > 0.5)) return HUGE_VAL;
+  const double z = reach / room, zz = z * z;
+  return t * (2 * moments[0] + band * moments[1]) +
+         0.5 * t * t * norm * zz * (6 + 6 * z * band + zz * band * band) / (room * room);
+}
 
 double ColumnTaps::error_at(double w) const {
   return over_all_places(of_taps(taps), w, [&](const NodeFunctional& at) { return symbol_error(at, w); });

@@ -1,6 +1,7 @@
 // What interpolation by the six weights of kernels/shared/column_taps.h errs, and by the eight.
 #pragma once
 
+#include <array>
 #include <vector>
 
 namespace vdvr {
@@ -22,6 +23,12 @@ struct ColumnTaps {
   double slope = 0, slope_sum = 0;
   /// Evaluated in fp32 from a g that errs by at most 2^-25: sum over the taps of what a weight errs.
   double rounding = 0;
+  /// |sum over the taps of their weights times y^n q(y)| <= moment[n - 1] sup |q|, y from the place, for
+  /// every bounded q of the band: n = 1 and 2.
+  std::array<double, 2> moments{};
+  /// What the interpolant errs more, of sup |q|, where it is of (1 + tau y)^-2 q(y / (1 + tau y)), y from any
+  /// place: docs/error-bounds.md, section 16.
+  [[nodiscard]] double error_of_wedge(double tau) const;
   /// |E(w)| of the wave w, radians a column, |w| <= band: at most that over all f.
   [[nodiscard]] double error_at(double w) const;
 };

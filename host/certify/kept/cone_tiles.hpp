@@ -18,6 +18,7 @@
 #include "host/certify/bounds/projection_bounds.hpp"
 #include "host/certify/kept/gold_filters.hpp"
 #include "host/certify/kept/projective_error.hpp"
+#include "host/certify/kept/upright_views.hpp"
 #include "host/field/fbp/coverage.hpp"
 #include "shared/cone_nodes.h"
 #include "vdvr/error.hpp"
@@ -56,10 +57,10 @@ class ConeTiles {
   ConeTiles(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, const FieldSups& sups,
             const Coverage& coverage, const ConeLattice& lattice);
 
-  /// Adds F at the nodes to what the pages hold. Cost: with upright detectors on a CPU six multiply-adds of
+  /// Adds F at the nodes to what the pages hold. Cost: on a CPU six multiply-adds of
   /// eight lanes a view and node and six of single ones for each row of the table between two nodes, else 12
-  /// of eight lanes; and tables of all views. Memory: tables of some views, at most a quarter of what is
-  /// left.
+  /// of eight lanes; and tables of all views, of leaning detectors 20 of eight lanes an entry besides.
+  /// Memory: tables of some views, at most a quarter of what is left.
   void back_project(std::span<const ConePage> pages, const Progress& progress);
   /// Seconds that the tables of the last call took.
   [[nodiscard]] double table_seconds() const { return table_seconds_; }
@@ -78,14 +79,21 @@ class ConeTiles {
   struct Errors {
     double interpolation = 0, rounding = 0;
   };
-  [[nodiscard]] Errors errors() { return errors(views_together_); }
-  /// The same where memory had allowed so many views at once, from 1 to most_views, or on another device. Six
-  /// taps: what earlier programs charged, with tables at 8x; of rounding at least.
-  [[nodiscard]] Errors errors(std::int64_t together, Fp64 fp64 = Fp64::as_here,
-                              Interpolation taps = Interpolation::eight_taps);
+  [[nodiscard]] Errors errors() { return errors(views_together_, Fp64::as_here, Form{}); }
+  /// What earlier programs charged: of six taps, with tables at 8x, rounding at least; of both where leaning
+  /// detectors had no tables of upright ones, and sums over views were charged with the taps' norm.
+  struct Form {
+    Interpolation taps = Interpolation::eight_taps;
+    bool earlier = false;
+  };
+  /// The same where memory had allowed so many views at once, from 1 to most_views, on another device, or of
+  /// another form.
+  [[nodiscard]] Errors errors(std::int64_t together, Fp64 fp64, const Form& form);
+  /// Those that a file with such taps may have of these views.
+  [[nodiscard]] std::vector<Form> forms(Interpolation taps) const;
   static constexpr std::int64_t most_views = 16;
-  /// Roundings of a sum over views: four in a lane, the lanes of so many in a sum, and those sums.
-  [[nodiscard]] static double roundings_of_sum(std::int64_t views, std::int64_t together);
+  /// Roundings of a sum over views: four in a lane; then the lanes of so many in a sum, and those sums.
+  [[nodiscard]] static std::pair<double, double> roundings_of_sum(std::int64_t views, std::int64_t together);
   /// Of an axis, x and y alike: designed for the band with which it errs least, most views being below the
   /// highest. Where a band exceeds what filters are designed for, none; `error` is infinite.
   struct BestFilter {
@@ -104,10 +112,22 @@ class ConeTiles {
   };
   void look_at_axis(std::size_t axis, const Coverage& coverage);
   void look_at_views(const Coverage& coverage);
+  void look_at_table(const std::vector<Corners>& parts, const std::array<double, 2>& beyond);
+  /// As the tables have them.
+  [[nodiscard]] const std::vector<ViewMatrix>& views() const {
+    return upright_views_ ? upright_views_->views() : scan_.views;
+  }
+  [[nodiscard]] std::int64_t plane() const { return table_columns_.count * column_stride_; }
+  [[nodiscard]] std::int64_t dense_stride() const {
+    return upright_views_ ? column_stride(rows_.count + VDVR_CONE_HEIGHTS) : column_stride_;
+  }
   [[nodiscard]] std::int64_t views_together() const;
   using NodesKernel = opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_ulong, VdvrConeNodes>;
   [[nodiscard]] NodesKernel nodes_kernel(int lanes);
   [[nodiscard]] Table table(std::int64_t first, std::int64_t views);
+  [[nodiscard]] Table dense_table(std::int64_t first, std::int64_t views);
+  template <class Real>
+  [[nodiscard]] Table upright_table(const Table& dense);
   template <class Real>
   void launch(const Table& table, const ConePage& page, VdvrConeNodes shape);
   [[nodiscard]] double highest(std::size_t axis) const {
@@ -124,15 +144,22 @@ class ConeTiles {
   };
   Known& known(std::size_t axis, const GoldFilter& filter);
 
+  // Values of a table to a pixel, both ways: what eight taps are made for.
+  static constexpr int density = 6;
+  // Rows from which on tables are made by transforms along v.
+  static constexpr std::int64_t fewest_rows = 16;
+
   opencl::State& state_;
   const FilteredScan& scan_;
   Upsampler& upsampler_;
   const FieldSups& sups_;
   ConeLattice lattice_;
-  UpsampledColumns columns_, rows_;
+  std::optional<UprightViews> upright_views_;  // where detectors lean
+  UpsampledColumns columns_, rows_;            // of the detectors themselves
+  TableAxis table_columns_, table_rows_;
   std::int64_t column_stride_ = 0, views_together_ = 1;
   std::optional<DenseValues> dense_;
-  bool upright_ = true, in_double_ = true, in_runs_ = true;
+  bool in_double_ = true, in_runs_ = true;
   double sup_ = 0, largest_weight_ = 0;
   Vec3 band_{};
   double table_seconds_ = 0;

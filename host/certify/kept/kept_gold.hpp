@@ -75,13 +75,14 @@ class KeptGold {
   [[nodiscard]] GoldLattice lattice(const Grid& grid, int rate) const;
   /// Cost: milliseconds for each new ratio.
   [[nodiscard]] GoldErrors errors(const GoldLattice& lattice);
-  /// The `interpolation` of these in files of earlier programs, whose cone beam has six taps.
-  [[nodiscard]] double interpolation_by(Interpolation taps, const GoldLattice& lattice);
+  /// What the `interpolation` of these may be in a file whose cone beam has such taps: this program's, and
+  /// those of earlier ones.
+  [[nodiscard]] std::vector<double> interpolation_by(Interpolation taps, const GoldLattice& lattice);
   /// What fourth differences of gold on that lattice err, xx, yy, zz, xy, xz, yz: of F^, rounding included.
   [[nodiscard]] std::array<double, 6> fourth_errors(const GoldLattice& lattice);
   /// The least and the most that `rounding` of these would be: on this device whatever memory allows, which
-  /// of cone beam says how many views lie there together; else on any, with double precision or without. Of
-  /// files with six taps only the least is known.
+  /// of cone beam says how many views lie there together; else on any, with double precision or without; and
+  /// of earlier programs. Of files with six taps only the least is known.
   [[nodiscard]] std::pair<double, double> rounding_elsewhere(const GoldLattice& lattice, bool this_device,
                                                              Interpolation taps);
 

@@ -84,11 +84,14 @@ std::array<double, 6> KeptGold::fourth_errors(const GoldLattice& lattice) {
   return out;
 }
 
-double KeptGold::interpolation_by(Interpolation taps, const GoldLattice& lattice) {
+std::vector<double> KeptGold::interpolation_by(Interpolation taps, const GoldLattice& lattice) {
   const double own = errors(lattice).interpolation;
-  if (!cone_ || taps == Interpolation::eight_taps) return own;
-  return own + norm_of_filters(lattice) *
-                   (cone_->errors(1, Fp64::as_here, taps).interpolation - cone_->errors().interpolation);
+  if (!cone_) return {own};
+  std::vector<double> out;
+  for (const ConeTiles::Form& form : cone_->forms(taps))
+    out.push_back(own + norm_of_filters(lattice) * (cone_->errors(1, Fp64::as_here, form).interpolation -
+                                                    cone_->errors().interpolation));
+  return out;
 }
 
 std::pair<double, double> KeptGold::rounding_elsewhere(const GoldLattice& lattice, bool this_device,
@@ -104,9 +107,10 @@ std::pair<double, double> KeptGold::rounding_elsewhere(const GoldLattice& lattic
       continue;
     }
     const double nodes = norm_of_filters(lattice), now = cone_->errors().rounding;
-    for (std::int64_t together = 1; together <= std::min(scan_.geometry.views(), ConeTiles::most_views);
-         ++together)
-      take(own + nodes * (cone_->errors(together, fp64, taps).rounding - now));
+    for (const ConeTiles::Form& form : cone_->forms(taps))
+      for (std::int64_t together = 1; together <= std::min(scan_.geometry.views(), ConeTiles::most_views);
+           ++together)
+        take(own + nodes * (cone_->errors(together, fp64, form).rounding - now));
   }
   return out;
 }

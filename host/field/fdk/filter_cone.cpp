@@ -101,7 +101,10 @@ FilteredScan filter_cone(opencl::State& state, const ProjectionSet& scan, const 
   ConeFrame frame(scan, field, units);
   const ParallelGeometry& detector = scan.geometry;
   const FdkWeights& weights = frame.weights;
-  const std::vector<double>& of_view = frame.of_view;
+  // Samples come to their unit before the filter, so that none of what it makes of them is lost.
+  std::vector<double> of_view;
+  for (const double w : frame.of_view) of_view.push_back(std::ldexp(w, units.line));
+  const double unit = std::ldexp(1.0, -units.line);
   const std::vector<bool>& flipped = frame.flipped;
   FilteredScan out = std::move(frame.filtered);
   out.fft_length = fft::good_length(2 * out.geometry.columns - 1);
@@ -139,7 +142,7 @@ FilteredScan filter_cone(opencl::State& state, const ProjectionSet& scan, const 
       for (std::int64_t v = 0; v < g.rows; ++v)
         std::transform(view.begin() + v * g.columns, view.begin() + (v + 1) * g.columns,
                        weighed.begin() + k * size + (flipped[at(first + k)] ? g.rows - 1 - v : v) * g.columns,
-                       [](double p) { return static_cast<float>(p); });
+                       [&](double p) { return static_cast<float>(p * unit); });
     });
     const std::span<float> target = std::span<float>(out.samples).subspan(at(first * size), at(n * size));
     (*filter)(weighed, std::span<const double>(of_view).subspan(at(first), at(n)), target, {});

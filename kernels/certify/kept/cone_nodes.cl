@@ -9,21 +9,11 @@
 #include "device/lanes.h"
 #include "shared/cone_nodes.h"
 
-#define COLUMN(j) vload8(0, from + (size_t)(j)*column_stride)
 // What a view adds at one height: eight columns of eight rows, by weights along u, then along v.
-#define ADD(n, at_u, weight, at_v, share_v)                                                         \
-  {                                                                                                 \
-    __global const float* from =                                                                    \
-        plane + (size_t)clamp(at_u, 0, s.last_column) * column_stride + clamp(at_v, 0, s.last_row); \
-    float8 left = (float8)(weight.s0) * COLUMN(0), right = (float8)(weight.s7) * COLUMN(7);         \
-    left = fma((float8)(weight.s1), COLUMN(1), left);                                               \
-    right = fma((float8)(weight.s6), COLUMN(6), right);                                             \
-    left = fma((float8)(weight.s2), COLUMN(2), left);                                               \
-    right = fma((float8)(weight.s5), COLUMN(5), right);                                             \
-    left = fma((float8)(weight.s3), COLUMN(3), left);                                               \
-    right = fma((float8)(weight.s4), COLUMN(4), right);                                             \
-    sum##n = fma(taps(share_v), left + right, sum##n);                                              \
-  }
+#define ADD(n)                                                                                            \
+  sum##n = fma(taps(LANE(g_v, n)),                                                                        \
+               across_columns(from_column + clamp(LANE(row, n), 0, s.last_row), column_stride, weight_u), \
+               sum##n);
 
 #if VDVR_LANES > 8
 #error "each height has eight sums: eight lanes at most"
@@ -31,16 +21,7 @@
 #define BEGIN(n) float total##n = 0.0f;
 #define CLEAR(n) float8 sum##n = (float8)(0.0f);
 #define FOLD(n) total##n += sum_of(sum##n);
-#define UPRIGHT_PART(n) ADD(n, column, weight_u, LANE(row, n), LANE(g_v, n))
-#define TILTED_PART(n)                                                                         \
-  {                                                                                            \
-    const float8 weight_u = (float)(LANE(inverse, n) * LANE(inverse, n)) * taps(LANE(g_u, n)); \
-    ADD(n, LANE(column, n), weight_u, LANE(row, n), LANE(g_v, n))                              \
-  }
 #define PUT(n) to[n] += total##n;
-
-// Heights of eight as floats about their middle.
-#define IN_RUNS (VDVR_UPRIGHT && VDVR_DOUBLE)
 
 __kernel void cone_nodes(__global float* out, __global const float* table, __global const ConeView* views,
                          __global const int4* wanted, ulong first, VdvrConeNodes s) {
@@ -53,7 +34,7 @@ __kernel void cone_nodes(__global float* out, __global const float* table, __glo
   const float half_side = 0.5f * (float)(s.block_side - 1),
               half_height = 0.5f * (float)(s.block_groups * VDVR_CONE_HEIGHTS - 1);
   const REAL dy = (REAL)((float)(y - block_y * s.block_side) - half_side);
-#if IN_RUNS
+#if VDVR_DOUBLE  // heights of eight as floats about their middle
   const int run = height / VDVR_CONE_RUN * VDVR_CONE_RUN,
             eight = height / VDVR_CONE_HEIGHTS * VDVR_CONE_HEIGHTS;
   const double dz = (double)((float)run - half_height), to_middle = (double)((float)(eight - run) + 3.5f);
@@ -76,18 +57,11 @@ __kernel void cone_nodes(__global float* out, __global const float* table, __glo
         const REAL l_plane = fma(v->step_lambda[0], dx, v->step_lambda[1] * dy) + v->lambda,
                    u_plane = fma(v->step_u[0], dx, v->step_u[1] * dy),
                    v_plane = fma(v->step_v[0], dx, v->step_v[1] * dy);
-#if VDVR_UPRIGHT
         const REAL inverse = (REAL)1 / l_plane, u = fma(u_plane, inverse, v->part_u), whole_u = floor(u);
         const int column = (int)v->whole_u + (int)whole_u - 3;
         const float8 weight_u = (float)(inverse * inverse) * taps((float)(u - whole_u - 0.5f));
-#else
-        const SUM inverse = (REAL)1 / fma((SUM)(v->step_lambda[2]), dz, (SUM)(l_plane)),
-                  u8 = fma(fma((SUM)(v->step_u[2]), dz, (SUM)(u_plane)), inverse, (SUM)(v->part_u)),
-                  whole_u = floor(u8);
-        const INT column = (int)v->whole_u + TO_INT(whole_u) - 3;
-        const VEC g_u = NARROW(u8 - whole_u - 0.5f);
-#endif
-#if IN_RUNS
+        __global const float* from_column = plane + (size_t)clamp(column, 0, s.last_column) * column_stride;
+#if VDVR_DOUBLE  // heights of eight as floats about their middle
         const double slope = v->step_v[2] * inverse,
                      lowest = fma(fma(v->step_v[2], dz, v_plane), inverse, v->part_v) - 0.5f,
                      middle = fma(slope, to_middle, lowest);
@@ -101,11 +75,7 @@ __kernel void cone_nodes(__global float* out, __global const float* table, __glo
         const INT row = (int)v->whole_v + TO_INT(whole_v) - 3;
         const VEC g_v = NARROW(v8 - whole_v - 0.5f);
 #endif
-#if VDVR_UPRIGHT
-        FOR_LANES(UPRIGHT_PART)
-#else
-        FOR_LANES(TILTED_PART)
-#endif
+        FOR_LANES(ADD)
       }
       FOR_LANES(FOLD)
     }
