@@ -94,12 +94,11 @@ class TestedBricks {
     bool again = false;  // whether one rate did not decide
   };
   TestedBricks(VerifyField& field, const MixedVolume& volume, TotalAttack& attack, Limits limits,
-               bool windowed, const Progress& progress)
+               const Progress& progress)
       : field_(field),
         volume_(volume),
         attack_(attack),
         limits_(std::move(limits)),
-        windowed_(windowed),
         progress_(progress),
         bricks_(volume.level.size()),
         now_(volume.level.size()) {}
@@ -227,8 +226,6 @@ class TestedBricks {
           }
           attack_.consider(p);
           b.error = std::max(b.error, p.error);
-          // Cells of coarser gold may meet a window where the certificate's own do not.
-          if (windowed_ && p.rate < volume_.rate) b.error = 0;
           b.least = std::max(b.least, b.error - p.arithmetic);
           if (p.total <= b.total) return;
           b.total = p.total;
@@ -262,7 +259,6 @@ class TestedBricks {
   const MixedVolume& volume_;
   TotalAttack& attack_;
   Limits limits_;
-  bool windowed_;
   const Progress& progress_;
   std::vector<Brick> bricks_, now_;
   bool hopeless_ = false;
@@ -420,7 +416,7 @@ VerifyResult verify(Device& device, const ProjectionSet& scan, const MixedVolume
   TestedBricks tested(field, volume, attack,
                       {left_by_samplers(device, stored, sampler, volume.level.size()),
                        stored.measured_total + stored.budget.arithmetic.value},
-                      stored.window.has_value(), progress);
+                      progress);
   tested.sweep(selected, points_of_field.flags(), result);
   tested.settle(result);
 

@@ -167,11 +167,22 @@ static inline VEC curvature(__global const float* p, int stride, float correctio
     lowest = fmin(lowest, ec);                                                                   \
   }
 
+// What counts where F is in the window, whatever it errs by: elsewhere nothing is promised, and cells reach
+// out of it.
+#define IN_WINDOW(dx, dy, dz)                                                                 \
+  {                                                                                           \
+    const VEC v = READ(at + (dy)*row + (dx)*s.z_padded + (dz)),                               \
+              ec = fabs(READ(err + ((dy)*side + (dx)) * s.error_padded + (dz)));              \
+    const INT is_in = (v - widening[i] >= s.window_low) & (v + widening[i] <= s.window_high); \
+    e = fmax(e, select((VEC)(0.0f), ec, is_in));                                              \
+  }
+
 // Per column of gold cells of a tested piece: int4 {largest bound of |V - F| less the piece's constant, the
 // largest |V - F| at a corner of a cell whose corners are covered, both as float bits; the cell that has the
 // former, or -1; 0} and which cells were tested, 16 bits to a word: int4 out[item][y][x], uint
 // cells_tested[item][y][x][words]. `widening`: per item what the range of a cell is widened by beside its own
-// T (for the window only). cells_tested begins with zeros. A work-group does a column.
+// T, at least what F errs at a node (for the window only). cells_tested begins with zeros. A work-group does
+// a column.
 __kernel SHARED_COLUMN void verify_cells(__global int4* out, __global uint* cells_tested,
                                          __global const float* error, __global const float* field,
                                          __global const uchar* tested, VdvrGrid grid,
@@ -223,6 +234,17 @@ __kernel SHARED_COLUMN void verify_cells(__global int4* out, __global uint* cell
       total = select((VEC)(-1.0f), total, counts);
       // A node that is not covered is promised nothing.
       const INT covered = counts & (k + z_begin >= s.in_first) & (k + z_begin <= s.in_last);
+      if (s.windowed) {
+        e = (VEC)(0.0f);
+        IN_WINDOW(0, 0, 0)
+        IN_WINDOW(1, 0, 0)
+        IN_WINDOW(0, 1, 0)
+        IN_WINDOW(1, 1, 0)
+        IN_WINDOW(0, 0, 1)
+        IN_WINDOW(1, 0, 1)
+        IN_WINDOW(0, 1, 1)
+        IN_WINDOW(1, 1, 1)
+      }
       if (flag == 2) worst_error = fmax(worst_error, LARGEST(select((VEC)(0.0f), e, covered)));
       const float largest = LARGEST(total);
 #define MARK(lane) bits |= LANE(counts, lane) ? 1u << 0x##lane : 0u;

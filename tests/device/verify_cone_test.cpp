@@ -473,6 +473,29 @@ BOOST_AUTO_TEST_CASE(a_detector_far_off_the_axis_verifies) {
   BOOST_TEST(r.holds, r.failure);
 }
 
+// Cells of verify's reach farther out of a window than build's: what nodes beyond it err is not promised, and
+// what those within err is.
+BOOST_AUTO_TEST_CASE(nodes_beyond_a_window_are_promised_nothing) {
+  CertifyOptions options;
+  const auto [low, high] = std::array{0.1, 0.4};
+  options.build.window = {low, high};
+  const BuildResult windowed =
+      certify(support::device(), built().scan, Tolerance{.relative = 0.08}, options);
+  VerifyOptions all;
+  all.exhaustive = true;
+  const auto again = [&](const Certificate& c) {
+    return verify(support::device(), built().scan, windowed.volume, c, all);
+  };
+  const VerifyResult r = again(windowed.certificate);
+  BOOST_TEST(r.holds, r.failure);
+  Certificate less = windowed.certificate;
+  for (float& total : less.brick_totals)
+    if (total > 0) total *= 0.5f;
+  const VerifyResult broken = again(less);
+  BOOST_TEST(!broken.holds);
+  BOOST_TEST(broken.failure.find("of one brick") != std::string::npos, broken.failure);
+}
+
 // A certificate that says more than is so: of the terms that build's own code makes again.
 BOOST_AUTO_TEST_CASE(edited_terms_are_told) {
   const auto changed = [&](const auto& change) {
