@@ -159,28 +159,6 @@ inline void check_certificate(const BuildResult& result, Report& r) {
   }
 }
 
-/// What a certificate speaks of: of cone beam less than what all views see.
-class Claims {
- public:
-  explicit Claims(const Inputs& in)
-      : scan_(in.scan), center_(in.field.center.value_or(in.scan.geometry.center)) {
-    if (in.scan.cone) cylinder_.emplace(in.scan, in.field);
-  }
-  [[nodiscard]] bool contain(const Vec3& p) const {
-    return cylinder_ ? cylinder_->contains(p) : is_covered(scan_.geometry, center_, p);
-  }
-  [[nodiscard]] std::pair<double, double> heights() const {
-    if (cylinder_) return cylinder_->cylinder().z;
-    const double half = 0.5 * static_cast<double>(scan_.geometry.rows - 1) * scan_.geometry.pitch_v;
-    return {-half, half};
-  }
-
- private:
-  const ProjectionSet& scan_;
-  double center_;
-  std::optional<CertifiedRegion> cylinder_;
-};
-
 /// Places where V is most likely to be farthest from F.
 inline std::vector<Vec3> hostile_points(const Case& c, const Inputs& in, const BuildResult& result,
                                         Random& random) {
@@ -246,7 +224,7 @@ inline std::vector<Vec3> hostile_points(const Case& c, const Inputs& in, const B
       add(cell);
     }
   // A scan of one row covers a plane only, and rows end on one.
-  const auto [bottom, top] = Claims(in).heights();
+  const auto [bottom, top] = CertifiedRegion(in.scan, in.field).cylinder().z;
   const double last = g.origin[2] + static_cast<double>(g.cells[2]) * g.spacing[2];
   for (Vec3& p : points) {
     if (in.scan.geometry.rows > 1 && !chance(random, 0.05)) continue;
@@ -276,7 +254,7 @@ class Truth {
         result_(result),
         report_(report),
         exact_(in.scan, in.field),
-        claims_(in),
+        region_(in.scan, in.field),
         total_(result.certificate.total_buffer) {
     if (!result.certificate.brick_totals.empty()) bounds_ = brick_bounds(result.certificate, false);
   }
@@ -286,7 +264,7 @@ class Truth {
     const auto F = exact_.at(points);
     std::vector<double> ratios(points.size(), -1);
     for (std::size_t i = 0; i < points.size(); ++i) {
-      if (!claims_.contain(points[i])) continue;
+      if (!region_.contains(points[i])) continue;
       if (in_.options.window && !(F[i] >= in_.options.window->first && F[i] <= in_.options.window->second))
         continue;
       if (!is_inside(in_.options.roi, points[i])) continue;
@@ -346,7 +324,7 @@ class Truth {
   const BuildResult& result_;
   Report& report_;
   ExactField exact_;
-  Claims claims_;
+  CertifiedRegion region_;
   std::vector<float> bounds_;
   double total_;
   std::set<std::string> seen_;
@@ -358,9 +336,9 @@ inline void check_points(const Case& c, const Inputs& in, const BuildResult& res
   std::vector<Vec3> points = hostile_points(c, in, result, random);
   if (!result.certificate.holds_buffer) {
     // With a region or a window nothing may be left to test, and nothing is promised then.
-    const Claims claims(in);
+    const CertifiedRegion region(in.scan, in.field);
     if (!in.options.roi && !in.options.window &&
-        std::any_of(points.begin(), points.end(), [&](const Vec3& p) { return claims.contain(p); }))
+        std::any_of(points.begin(), points.end(), [&](const Vec3& p) { return region.contains(p); }))
       r.fail("does not hold", "nothing is certified of a grid with covered points");
     return;
   }
