@@ -163,7 +163,6 @@ ColumnTaps compute_facts(const Polynomials& p, double band) {
   facts.error =
       over_all_places(p, band, [&](const NodeFunctional& at) { return largest_symbol_error(at, band); });
   facts.sup = over_all_places(p, band, [&](const NodeFunctional& at) { return sup_constant(at, band); });
-  facts.moments = bound_moments(p, band);
   facts.rounding = weights_rounding(p);
   bound_sums(facts, p);
   return facts;
@@ -174,13 +173,23 @@ ColumnTaps compute_facts(const Polynomials& p, double band) {
 std::vector<double> six_taps(double f) { return derivatives(of_six(), f, 0); }
 std::vector<double> eight_taps(double f) { return derivatives(of_eight(), f, 0); }
 
+const std::array<double, 2>& ColumnTaps::moments() const {
+  if (taps == 6) {
+    static const std::array<double, 2> of_six_taps = bound_moments(of_six(), band);
+    return of_six_taps;
+  }
+  static const std::array<double, 2> of_eight_taps = bound_moments(of_eight(), band);
+  return of_eight_taps;
+}
+
 // With z = y / (1 + tau y) it is (z / y)^2 q(z), whose first derivative by tau is -(y^2 q)' at tau = 0, and
 // the second (z / y)^2 (6 z^2 q + 6 z^3 q' + z^4 q'') anywhere. q' and q'' have at most band and band^2 of q.
 double ColumnTaps::error_of_wedge(double tau) const {
+  if (tau == 0) return 0;
   const double t = std::abs(tau), reach = 0.5 * static_cast<double>(taps), room = 1 - t * reach;
   if (!(room > 0.5)) return HUGE_VAL;
   const double z = reach / room, zz = z * z;
-  return t * (2 * moments[0] + band * moments[1]) +
+  return t * (2 * moments()[0] + band * moments()[1]) +
          0.5 * t * t * norm * zz * (6 + 6 * z * band + zz * band * band) / (room * room);
 }
 

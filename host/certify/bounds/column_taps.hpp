@@ -23,9 +23,9 @@ struct ColumnTaps {
   double slope = 0, slope_sum = 0;
   /// Evaluated in fp32 from a g that errs by at most 2^-25: sum over the taps of what a weight errs.
   double rounding = 0;
-  /// |sum over the taps of their weights times y^n q(y)| <= moment[n - 1] sup |q|, y from the place, for
-  /// every bounded q of the band: n = 1 and 2.
-  std::array<double, 2> moments{};
+  /// |sum over the taps of their weights times y^n q(y)| <= moments()[n - 1] sup |q|, y from the place, for
+  /// every bounded q of the band: n = 1 and 2. Computed at the first call (some 150 ms), then kept.
+  [[nodiscard]] const std::array<double, 2>& moments() const;
   /// What the interpolant errs more, of sup |q|, where it is of (1 + tau y)^-2 q(y / (1 + tau y)), y from any
   /// place: docs/error-bounds.md, section 16.
   [[nodiscard]] double error_of_wedge(double tau) const;
