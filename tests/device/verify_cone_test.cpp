@@ -479,8 +479,7 @@ BOOST_AUTO_TEST_CASE(nodes_beyond_a_window_are_promised_nothing) {
   CertifyOptions options;
   const auto [low, high] = std::array{0.1, 0.4};
   options.build.window = {low, high};
-  const BuildResult windowed =
-      certify(support::device(), built().scan, Tolerance{.relative = 0.08}, options);
+  const BuildResult windowed = certify(support::device(), built().scan, Tolerance{.relative = 0.08}, options);
   VerifyOptions all;
   all.exhaustive = true;
   const auto again = [&](const Certificate& c) {
