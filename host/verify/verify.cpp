@@ -319,13 +319,13 @@ WorstBricks sum_up(const std::vector<TestedBricks::Brick>& bricks, const Certifi
     out.least = std::max({out.least, b.least, b.finer});
     if (b.again) ++result.bricks_finer;
     result.finest_rate = std::max(result.finest_rate, b.tried);
-    // With a window a brick of which build tested nothing may have cells here, whose range is widened by
-    // more.
-    const bool promised = !stored.brick_totals.empty() && (stored.brick_totals[i] >= 0 || !stored.window);
-    if (promised) {
-      const double bound = static_cast<double>(stored.brick_totals[i]) + stored.budget.arithmetic.value;
+    // At the rim, and at the ends of a window, cells are tested here that hold nothing promised. A node that
+    // is covered, and whose value lies in the window, is in a brick that build tested.
+    if (!stored.brick_totals.empty()) {
+      const auto total = static_cast<double>(stored.brick_totals[i]);
+      const double bound = total + stored.budget.arithmetic.value;
       // Between gold nodes the certificate's bound holds with the sampler's rounding.
-      if (!(b.least <= bound) || !(b.finer <= bound + sampler.buffer.value))
+      if (total < 0 ? b.error > 0 : !(b.least <= bound) || !(b.finer <= bound + sampler.buffer.value))
         out.broken = static_cast<std::int64_t>(i);
     }
     if (sampler.image3d)

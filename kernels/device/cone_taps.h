@@ -31,38 +31,35 @@ typedef struct {
 #define EVEN_OF(pick) COEFFICIENTS(pick, EVEN, SAME)
 #define ODD_OF(pick) COEFFICIENTS(pick, ODD, OPPOSITE)
 
+// The weights at g, whose square is s: in a vector type T, of coefficients that `widened` brings there.
+#define TAPS(T, g, s, widened)                                                              \
+  fma((T)(g),                                                                               \
+      VDVR_TAPS_FUSED_HORNER(T, s, widened(ODD_OF(FIRST_OF)), widened(ODD_OF(SECOND_OF)),   \
+                             widened(ODD_OF(THIRD_OF))),                                    \
+      VDVR_TAPS_FUSED_HORNER(T, s, widened(EVEN_OF(FIRST_OF)), widened(EVEN_OF(SECOND_OF)), \
+                             widened(EVEN_OF(THIRD_OF))))
+
 static inline __attribute__((always_inline)) float8 taps(float g) {
   const float s = g * g;
-  return fma((float8)(g),
-             VDVR_TAPS_FUSED_HORNER(float8, s, ODD_OF(FIRST_OF), ODD_OF(SECOND_OF), ODD_OF(THIRD_OF)),
-             VDVR_TAPS_FUSED_HORNER(float8, s, EVEN_OF(FIRST_OF), EVEN_OF(SECOND_OF), EVEN_OF(THIRD_OF)));
+  return TAPS(float8, g, s, SAME);
 }
 
 // Of two places, each of which fills one half of `g`.
 #define TWICE(taps) (float16)(taps, taps)
 static inline __attribute__((always_inline)) float16 taps_of_two(float16 g) {
   const float16 s = g * g;
-  return fma(g,
-             VDVR_TAPS_FUSED_HORNER(float16, s, TWICE(ODD_OF(FIRST_OF)), TWICE(ODD_OF(SECOND_OF)),
-                                    TWICE(ODD_OF(THIRD_OF))),
-             VDVR_TAPS_FUSED_HORNER(float16, s, TWICE(EVEN_OF(FIRST_OF)), TWICE(EVEN_OF(SECOND_OF)),
-                                    TWICE(EVEN_OF(THIRD_OF))));
+  return TAPS(float16, g, s, TWICE);
 }
 
-// Eight columns of eight rows, weighed.
-#define COLUMN(j) vload8(0, from + (size_t)(j)*stride)
-static inline __attribute__((always_inline)) float8 across_columns(__global const float* from, int stride,
-                                                                   float8 weight) {
-  float8 left = (float8)(weight.s0) * COLUMN(0), right = (float8)(weight.s7) * COLUMN(7);
-  left = fma((float8)(weight.s1), COLUMN(1), left);
-  right = fma((float8)(weight.s6), COLUMN(6), right);
-  left = fma((float8)(weight.s2), COLUMN(2), left);
-  right = fma((float8)(weight.s5), COLUMN(5), right);
-  left = fma((float8)(weight.s3), COLUMN(3), left);
-  right = fma((float8)(weight.s4), COLUMN(4), right);
-  return left + right;
-}
-#undef COLUMN
+// `left` and `right`: four columns each, weighed, in a vector type T; column(j) has the j-th of eight.
+#define WEIGH_COLUMNS(T, weight, column)                                   \
+  T left = (T)(weight.s0) * column(0), right = (T)(weight.s7) * column(7); \
+  left = fma((T)(weight.s1), column(1), left);                             \
+  right = fma((T)(weight.s6), column(6), right);                           \
+  left = fma((T)(weight.s2), column(2), left);                             \
+  right = fma((T)(weight.s5), column(5), right);                           \
+  left = fma((T)(weight.s3), column(3), left);                             \
+  right = fma((T)(weight.s4), column(4), right);
 
 static inline __attribute__((always_inline)) float sum_of(float8 v) {
   const float4 four = v.lo + v.hi;

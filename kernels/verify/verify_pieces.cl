@@ -148,6 +148,8 @@ static inline VEC curvature(__global const float* p, int stride, float correctio
             inner = (low - c) + (high - c);
   return inner + (3.0f * inner - outer) * (correction * (1.0f / 12.0f));
 }
+#define FOR_CORNERS(DO) \
+  DO(0, 0, 0) DO(1, 0, 0) DO(0, 1, 0) DO(1, 1, 0) DO(0, 0, 1) DO(1, 0, 1) DO(0, 1, 1) DO(1, 1, 1)
 #define CORNER(dx, dy, dz)                                                                       \
   {                                                                                              \
     __global const float* p = at + (dy)*row + (dx)*s.z_padded + (dz);                            \
@@ -213,14 +215,7 @@ __kernel SHARED_COLUMN void verify_cells(__global int4* out, __global uint* cell
       __global const float* err = error + (((size_t)i * side + y) * side + x) * s.error_padded + z;
       VEC px = (VEC)(0.0f), py = px, pz = px, mx = px, my = px, mz = px;
       VEC low = (VEC)(INFINITY), high = -low, lowest = low, highest = high;
-      CORNER(0, 0, 0)
-      CORNER(1, 0, 0)
-      CORNER(0, 1, 0)
-      CORNER(1, 1, 0)
-      CORNER(0, 0, 1)
-      CORNER(1, 0, 1)
-      CORNER(0, 1, 1)
-      CORNER(1, 1, 1)
+      FOR_CORNERS(CORNER)
       // Where F is convex its interpolant lies above it, where it is concave below.
       const VEC over = 0.125f * (px + py + pz), under = -0.125f * (mx + my + mz);
       const INT k = z + INDEX;
@@ -236,14 +231,7 @@ __kernel SHARED_COLUMN void verify_cells(__global int4* out, __global uint* cell
       const INT covered = counts & (k + z_begin >= s.in_first) & (k + z_begin <= s.in_last);
       if (s.windowed) {
         e = (VEC)(0.0f);
-        IN_WINDOW(0, 0, 0)
-        IN_WINDOW(1, 0, 0)
-        IN_WINDOW(0, 1, 0)
-        IN_WINDOW(1, 1, 0)
-        IN_WINDOW(0, 0, 1)
-        IN_WINDOW(1, 0, 1)
-        IN_WINDOW(0, 1, 1)
-        IN_WINDOW(1, 1, 1)
+        FOR_CORNERS(IN_WINDOW)
       }
       if (flag == 2) worst_error = fmax(worst_error, LARGEST(select((VEC)(0.0f), e, covered)));
       const float largest = LARGEST(total);

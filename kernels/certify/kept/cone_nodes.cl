@@ -10,10 +10,13 @@
 #include "shared/cone_nodes.h"
 
 // What a view adds at one height: eight columns of eight rows, by weights along u, then along v.
-#define ADD(n)                                                                                            \
-  sum##n = fma(taps(LANE(g_v, n)),                                                                        \
-               across_columns(from_column + clamp(LANE(row, n), 0, s.last_row), column_stride, weight_u), \
-               sum##n);
+#define COLUMN(j) vload8(0, from + (size_t)(j)*column_stride)
+#define ADD(n)                                                                     \
+  {                                                                                \
+    __global const float* from = from_column + clamp(LANE(row, n), 0, s.last_row); \
+    WEIGH_COLUMNS(float8, weight_u, COLUMN)                                        \
+    sum##n = fma(taps(LANE(g_v, n)), left + right, sum##n);                        \
+  }
 
 #if VDVR_LANES > 8
 #error "each height has eight sums: eight lanes at most"

@@ -37,13 +37,7 @@ static ALWAYS_INLINE int floor_of(double v) {
 static ALWAYS_INLINE void make_strip(float16* to, __global const float* from, int stride, int chunks,
                                      float8 weight) {
   for (int c = 0; c < chunks; ++c, from += 16) {
-    float16 left = (float16)(weight.s0) * COLUMN(0), right = (float16)(weight.s7) * COLUMN(7);
-    left = fma((float16)(weight.s1), COLUMN(1), left);
-    right = fma((float16)(weight.s6), COLUMN(6), right);
-    left = fma((float16)(weight.s2), COLUMN(2), left);
-    right = fma((float16)(weight.s5), COLUMN(5), right);
-    left = fma((float16)(weight.s3), COLUMN(3), left);
-    right = fma((float16)(weight.s4), COLUMN(4), right);
+    WEIGH_COLUMNS(float16, weight, COLUMN)
     to[c] = left + right;
   }
 }

@@ -20,26 +20,16 @@ typedef struct {
 #define REAL8 float8
 #define TO_REAL8(v) (v)
 #endif
-#define WIDER(kind, pick) TO_REAL8(kind##_OF(pick))
 
 static inline __attribute__((always_inline)) REAL8 weights_of(REAL g) {
   const REAL s = g * g;
-  return fma(
-      (REAL8)(g),
-      VDVR_TAPS_FUSED_HORNER(REAL8, s, WIDER(ODD, FIRST_OF), WIDER(ODD, SECOND_OF), WIDER(ODD, THIRD_OF)),
-      VDVR_TAPS_FUSED_HORNER(REAL8, s, WIDER(EVEN, FIRST_OF), WIDER(EVEN, SECOND_OF), WIDER(EVEN, THIRD_OF)));
+  return TAPS(REAL8, g, s, TO_REAL8);
 }
 
-#define COLUMN(j) TO_REAL8(vload8(0, at + (size_t)(j)*s.from_stride))
-static inline __attribute__((always_inline)) float value_of(__global const float* at, REAL8 u, REAL8 v,
-                                                            REAL weight, VdvrUprightTable s) {
-  REAL8 left = (REAL8)(u.s0) * COLUMN(0), right = (REAL8)(u.s7) * COLUMN(7);
-  left = fma((REAL8)(u.s1), COLUMN(1), left);
-  right = fma((REAL8)(u.s6), COLUMN(6), right);
-  left = fma((REAL8)(u.s2), COLUMN(2), left);
-  right = fma((REAL8)(u.s5), COLUMN(5), right);
-  left = fma((REAL8)(u.s3), COLUMN(3), left);
-  right = fma((REAL8)(u.s4), COLUMN(4), right);
+#define COLUMN(j) TO_REAL8(vload8(0, at + (size_t)(j)*stride))
+static inline __attribute__((always_inline)) float value_of(__global const float* at, int stride, REAL8 u,
+                                                            REAL8 v, REAL weight) {
+  WEIGH_COLUMNS(REAL8, u, COLUMN)
   const REAL8 all = v * (left + right);
   const REAL sum = ((all.s0 + all.s4) + (all.s2 + all.s6)) + ((all.s1 + all.s5) + (all.s3 + all.s7));
   return (float)(weight * sum);
@@ -59,8 +49,8 @@ __kernel void upright_table(__global float* out, __global const float* from, __g
       __global const UprightRow* r = of_view + row;
       const REAL place = fma(r->grow_u, (REAL)column, r->part_u), nearest = rint(place);
       const int left = clamp(r->column + column + (int)nearest, 0, s.last_column);
-      value = value_of(plane + (size_t)left * s.from_stride + r->row, weights_of(place - nearest),
-                       weights_of(r->part_v), r->weight, s);
+      value = value_of(plane + (size_t)left * s.from_stride + r->row, s.from_stride,
+                       weights_of(place - nearest), weights_of(r->part_v), r->weight);
     }
     to[row] = value;
   }
