@@ -103,8 +103,11 @@ ConeTiles::ConeTiles(opencl::State& state, const FilteredScan& scan, Upsampler& 
   in_double_ = ColumnUpsampling::is_possible(state);
   if (!std::all_of(scan.views.begin(), scan.views.end(), is_upright))
     upright_views_.emplace(scan.views, scan.geometry);
-  in_runs_ = in_double_ && opencl::lanes_of(state.info, to_int(heights)) > 1;
   look_at_views(coverage);
+  // A strip has the rows between a run's ends, eight that a height reads, a row on either side, and begins at
+  // a multiple of 16.
+  in_runs_ = in_double_ && opencl::lanes_of(state.info, to_int(heights)) > 1 &&
+             VDVR_CONE_RUN * row_step_ + 32 <= VDVR_CONE_STRIP;
   if (DenseValues::suit(state, scan.geometry, fewest_rows))
     dense_.emplace(state, upsampler, scan, columns_, rows_);
   column_stride_ = column_stride(table_rows_.count + heights);
