@@ -1,4 +1,4 @@
-"""Seeds of a test program run in many processes: scripts/hostile-builds and scripts/cone-attacks.
+"""Seeds of a test program run in many processes: scripts/hostile-builds, hostile-commands and cone-attacks.
 
 The program takes COUNT FIRST_SEED --json and prints a JSON line per seed, with `seed`, `outcome` and `failures`, a list
 of {kind, text}; it ends with 0, or with 1 where a seed failed."""
@@ -18,7 +18,8 @@ def run_chunk(command, first, count, limit, done):
     `limit` seconds names its seed, and another one goes on behind it."""
     end = first + count
     while first < end:
-        process = subprocess.Popen(command + [str(end - first), str(first), "--json"],
+        process = subprocess.Popen(command + [str(end - first), "--first", str(first), "--json"] if "--program" in command else
+                                   command + [str(end - first), str(first), "--json"],
                                    stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
         text, hangs, told = b"", False, time.monotonic()
         while True:
@@ -57,8 +58,9 @@ def add_options(parser, program, count, chunk):
     parser.add_argument("--log", help="a JSON line per seed goes here")
 
 
-def run(parser, print_failures):
-    """The records of all seeds in any order, and the seconds they took. `print_failures` sees each as it comes."""
+def run(parser, print_failures, interpreter=()):
+    """The records of all seeds in any order, and the seconds they took. `print_failures` sees each as it comes. With an
+    `interpreter`, words, it is what runs the seeds and is told of the program."""
     options = parser.parse_args()
     if options.count < 1 or options.jobs < 1 or options.chunk < 1:
         parser.error("COUNT, --jobs and --chunk must be at least 1")
@@ -66,7 +68,8 @@ def run(parser, print_failures):
         sys.exit("%s is missing: cmake --build build --target %s" %
                  (options.program, os.path.basename(options.program)))
     log = open(options.log, "w") if options.log else None
-    command = [options.program] + (["--cone"] if getattr(options, "cone", False) else [])
+    command = [*interpreter, "--program", options.program] if interpreter else [options.program]
+    command += ["--cone"] if getattr(options, "cone", False) else []
     records, lock, work = [], threading.Lock(), queue.Queue()
     for first in range(options.first, options.first + options.count, options.chunk):
         work.put((first, min(options.chunk, options.first + options.count - first)))

@@ -15,6 +15,7 @@
 #include "host/field/fbp/back_project.hpp"
 #include "tests/support/attack_chain.hpp"
 #include "tests/support/cone_scans.hpp"
+#include "tests/support/scans.hpp"
 
 namespace vdvr {
 namespace {
@@ -278,6 +279,49 @@ BOOST_AUTO_TEST_CASE(nodes_made_for_some_boxes_are_those_of_whole_tiles) {
     BOOST_TEST(is_alike(coarse, of_coarse));
     BOOST_TEST(sparing.prepare_seconds() == seconds);
   }
+}
+
+// Crews end what they prepare when others have done the work, and go on with the next pass.
+BOOST_AUTO_TEST_CASE(nodes_whose_making_was_ended_are_made_again) {
+  struct Ended {};
+  ConeShape shape = orbit(60, 20, 24);
+  shape.views = 40;
+  for (const bool cone : {true, false})
+    for (const bool sparing : {false, true}) {
+      const ProjectionSet scan = cone ? noisy_cone(shape, 5) : testing::noise_scan(40, 40, 24, 5);
+      const Chain chain(scan);
+      const Grid grid = cone ? grid_of(Coverage(chain.filtered.geometry, chain.filtered.views), 1) : [&] {
+        Grid g;
+        g.cells = {8, 8, 8};
+        g.spacing = {1, 1, 1};
+        g.origin = {-4, -4, -4};
+        return g;
+      }();
+      std::array<std::vector<float>, 2> found;
+      for (const bool ended : {false, true}) {
+        KeptGold kept(device().state(), chain.filtered, chain.sups, grid, 2, 8, Interpolation::six_taps);
+        if (sparing) kept.make_only_what_is_read();
+        const GoldLattice lattice = kept.lattice(grid, 4);
+        const GoldBox box{{4, 5, 6}, {17, 9, 17}};
+        bool was_ended = false;
+        if (ended) try {
+            kept.prepare(lattice, {box}, [](const std::string&, double) { throw Ended(); });
+          } catch (const Ended&) {
+            was_ended = true;
+          }
+        BOOST_TEST(was_ended == ended);
+        kept.prepare(lattice, {box}, {});
+        const std::int64_t stride = column_stride(box.nodes[2]);
+        const opencl::DeviceArray<float> out(device().state(), count(box.nodes[0] * box.nodes[1] * stride),
+                                             "gold");
+        kept.fill(lattice, box, out, 0, stride);
+        const std::vector<float> all = out.to_host();
+        for (std::int64_t column = 0; column < box.nodes[0] * box.nodes[1]; ++column)
+          std::copy_n(all.begin() + column * stride, box.nodes[2], std::back_inserter(found[ended ? 1 : 0]));
+      }
+      BOOST_TEST((found[0] == found[1]), (cone ? "cone" : "parallel") << (sparing ? ", sparing" : ""));
+      BOOST_TEST(*std::ranges::max_element(found[0]) > 0);
+    }
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <set>
 #include <stdexcept>
 
@@ -317,6 +318,7 @@ std::int64_t KeptGold::missing(const GoldLattice& lattice, const std::vector<Gol
 void KeptGold::prepare(const GoldLattice& lattice, const std::vector<GoldBox>& boxes,
                        const Progress& progress) {
   if (common_) make_common(progress);
+  const PartsOfTiles made_before = made_;
   std::vector<TileAt> tiles = sparing_ ? sparing_tiles(lattice, boxes) : new_tiles(lattice, boxes);
   if (tiles.empty()) return;
   std::vector<TileAt> all = all_tiles();
@@ -327,27 +329,35 @@ void KeptGold::prepare(const GoldLattice& lattice, const std::vector<GoldBox>& b
     tiles.assign(both.begin(), both.end());
   }
   const auto start = std::chrono::steady_clock::now();
-  if (cone_) back_project_heights(tiles, progress);
-  else back_project_tiles(tiles, progress);
+  try {
+    if (cone_) back_project_heights(tiles, progress);
+    else back_project_tiles(tiles, progress);
+  } catch (...) {  // crews end what they prepare when others have done the work, and go on
+    made_ = made_before;
+    throw;
+  }
   prepare_seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 void KeptGold::back_project_heights(std::span<const TileAt> tiles, const Progress& progress) {
   const auto start = std::chrono::steady_clock::now();
   const std::uint64_t tile = count(side * side * run_->stride);
-  const std::size_t first_page = run_->pages.size();
+  std::vector<opencl::DeviceArray<float>> made;
   std::vector<ConePage> pages;
   for (std::size_t i = 0; i < tiles.size(); i += run_->a_page) {
     const std::size_t n = std::min(run_->a_page, tiles.size() - i);
-    run_->pages.emplace_back(state_, scratch(), n * tile, "gold that is kept");
-    if (!scratch()) run_->pages.back().fill(0.0f);
+    made.emplace_back(state_, scratch(), n * tile, "gold that is kept");
+    if (!scratch()) made.back().fill(0.0f);
     const ColumnBlocks blocks = blocks_of(tiles.subspan(i, n));
     pages.push_back({nullptr, blocks.first, wanted(tiles.subspan(i, n), blocks)});
-    for (std::size_t j = 0; j < n; ++j)
-      tiles_[tiles[i + j]] = run_->tiles[tiles[i + j]] = {run_->pages.size() - 1, j * tile};
   }
-  for (std::size_t i = 0; i < pages.size(); ++i) pages[i].out = &run_->pages[first_page + i];
+  for (std::size_t i = 0; i < pages.size(); ++i) pages[i].out = &made[i];
   cone_->back_project(pages, progress);
+  // Only now: what was ended half-way is not kept.
+  for (std::size_t i = 0; i < tiles.size(); ++i)
+    tiles_[tiles[i]] =
+        run_->tiles[tiles[i]] = {run_->pages.size() + i / run_->a_page, i % run_->a_page * tile};
+  std::ranges::move(made, std::back_inserter(run_->pages));
   const double all = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   // Tables are made anew each time; who makes everything at once makes them once.
   column_seconds_ = std::max(column_seconds_, cone_->table_seconds());
@@ -370,12 +380,12 @@ void KeptGold::back_project_tiles(std::span<const TileAt> tiles, const Progress&
   const ParallelGeometry& g = scan_.geometry;
   const std::uint64_t tile = count(side * side * stride_);
   const auto each = at(std::max<std::int64_t>(1, static_cast<std::int64_t>(page_bytes / (4 * tile))));
-  const std::size_t first_page = pages_.size();
+  std::vector<opencl::DeviceArray<float>> made;
   for (std::size_t i = 0; i < tiles.size(); i += each) {
     const std::size_t n = std::min(each, tiles.size() - i);
-    pages_.emplace_back(state_, scratch(), n * tile, "gold that is kept");
+    made.emplace_back(state_, scratch(), n * tile, "gold that is kept");
     // Columns that nobody reads are not computed: let them be finite.
-    if (!scratch()) pages_.back().fill(0.0f);
+    if (!scratch()) made.back().fill(0.0f);
   }
   std::int64_t rows = static_cast<std::int64_t>(opencl::round_up(count(g.rows), 16));
   while (rows > 16 && upsampler_.slab_bytes(columns_, rows) >
@@ -385,24 +395,24 @@ void KeptGold::back_project_tiles(std::span<const TileAt> tiles, const Progress&
     const std::int64_t end = std::min(g.rows, first + rows);
     const UpsampledSlab slab = upsampled(first, end);
     const auto begun = std::chrono::steady_clock::now();
-    for (std::size_t page = first_page; page < pages_.size(); ++page) {
-      const std::size_t begin = (page - first_page) * each, n = std::min(each, tiles.size() - begin);
+    for (std::size_t page = 0; page < made.size(); ++page) {
+      const std::size_t begin = page * each, n = std::min(each, tiles.size() - begin);
       ColumnBlocks blocks = blocks_of(tiles.subspan(begin, n));
       blocks.wanted = wanted(blocks);
       blocks.out_stride = stride_;
       blocks.out_row = first;
-      back_project(state_, g, slab, blocks, interpolation_, pages_[page]);
+      back_project(state_, g, slab, blocks, interpolation_, made[page]);
       report(progress, "gold",
-             (static_cast<double>(first) + static_cast<double>(end - first) *
-                                               static_cast<double>(page - first_page + 1) /
-                                               static_cast<double>(pages_.size() - first_page)) /
+             (static_cast<double>(first) + static_cast<double>(end - first) * static_cast<double>(page + 1) /
+                                               static_cast<double>(made.size())) /
                  static_cast<double>(g.rows));
     }
     state_.queue.finish();  // before the next rows are allocated
     tile_seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   }
   for (std::size_t i = 0; i < tiles.size(); ++i)
-    tiles_[tiles[i]] = {first_page + i / each, count(static_cast<std::int64_t>(i % each)) * tile};
+    tiles_[tiles[i]] = {pages_.size() + i / each, i % each * tile};
+  std::ranges::move(made, std::back_inserter(pages_));
 }
 
 KeptGold::Shares KeptGold::all_over_part() {
