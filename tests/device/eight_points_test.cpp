@@ -62,3 +62,37 @@ BOOST_AUTO_TEST_CASE(eight_weights_are_lagranges) {
   BOOST_TEST(worst <= (8.3 + 0.25 * 2.7) * 0x1p-24);
   BOOST_TEST(worst > 0.83 * 0x1p-24);
 }
+
+BOOST_AUTO_TEST_CASE(weights_of_rows_are_lagranges_half_a_place_beyond) {
+  opencl::State& state = support::device().state();
+  constexpr int items = 4096;
+  std::vector<float> places;  // from the middle
+  for (int i = 0; i < items; ++i) places.push_back(2 * static_cast<float>(i) / (items - 1) - 1);
+  const opencl::DeviceArray<float> on_device(state, std::span<const float>(places), "places");
+  const opencl::DeviceArray<float> weights(state, 8 * places.size(), "weights");
+  cl::KernelFunctor<cl::Buffer, cl::Buffer, int> weigh(build_weights(state), "weigh_rows");
+  weigh(cl::EnqueueArgs(state.queue, cl::NDRange(items / 8)), on_device.buffer(), weights.buffer(), items);
+  const std::vector<float> found = weights.to_host();
+  double worst = 0, sum = 0, product = 0;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    double errors = 0, magnitudes = 0, distances = 1;
+    const double at = 0.5 + static_cast<double>(places[i]);
+    for (int n = 0; n < 8; ++n) {
+      const double exact = weight(at, n - 3);
+      errors += std::abs(static_cast<double>(found[static_cast<std::size_t>(n) * items + i]) - exact);
+      magnitudes += std::abs(exact);
+      distances *= std::abs(at - (n - 3));
+    }
+    worst = std::max(worst, errors);
+    sum = std::max(sum, magnitudes);
+    product = std::max(product, distances);
+  }
+  BOOST_TEST_MESSAGE(worst * 0x1p24 << " roundings");
+  BOOST_TEST(worst <= 22.9 * 0x1p-24);
+  BOOST_TEST(worst > 2.29 * 0x1p-24);
+  // As cone_bounds.cpp has them.
+  BOOST_TEST(sum <= 1.6592);
+  BOOST_TEST(sum > 1.659);
+  BOOST_TEST(product <= 55.37109375);
+  BOOST_TEST(product > 55.37);
+}

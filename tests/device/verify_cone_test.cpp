@@ -49,8 +49,12 @@ ConeShape orbit(double source, std::int64_t rows = 12, std::int64_t columns = 14
 }
 
 std::vector<Case> cases() {
-  ConeShape tilted = orbit(50), displaced = orbit(60), arc = orbit(45);
+  ConeShape tilted = orbit(50), other_way = orbit(40, 40), rolled = orbit(30), displaced = orbit(60),
+            arc = orbit(45);
   tilted.in_plane_deg = 1;
+  other_way.in_plane_deg = -3;
+  other_way.out_of_plane_deg = -2;
+  rolled.in_plane_deg = 40;
   tilted.out_of_plane_deg = 3;
   displaced.shift = 2.5;
   displaced.views = 30;
@@ -58,6 +62,8 @@ std::vector<Case> cases() {
   return {{"5 degrees", orbit(80)},
           {"15 degrees", orbit(26)},
           {"tilted", tilted},
+          {"tilted the other way", other_way},
+          {"rolled by 40 degrees", rolled},
           {"displaced", displaced},
           {"short scan", arc},
           {"fan beam", orbit(50, 1)},

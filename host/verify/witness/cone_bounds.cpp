@@ -178,17 +178,34 @@ double lagrange_share(const ViewOnBox& v, const Sups& sups, std::size_t axis, co
   return lagrange_error(1, between.points) * sum;
 }
 
+// Between two of eight points, and up to half a point beyond them: the product of the distances to all eight
+// over 8!, the sum of the weights' magnitudes, and how often a weight rounds, all at most.
+struct EightPoints {
+  double product, sum, roundings;
+};
+constexpr EightPoints between_two{43.06640625 / 40320, sum_of_cone_weights, 6},
+    beyond_two{55.37109375 / 40320, 1.6592, 14};
+EightPoints along_u(const ConeNodeFacts& nodes) { return nodes.lean > 0 ? beyond_two : between_two; }
+
+// q along a line that leans by s pixels a pixel: its frequencies are at most pi (1 + s), and its second
+// derivative is q_vv + 2 s q_uv + s^2 q_uu.
+double eighth_along(const Sups& sups, double s) {
+  const double mixed = pi * std::min(slope(sups.value, sups.second_u), slope(sups.value, sups.second_v));
+  return std::pow(pi * (1 + s), 6) * (sups.second_v + s * (2 * mixed + s * sups.second_u));
+}
+
 void add_nodes(NodeSums& out, const ViewOnBox& v, const Sups& sups, const ConePath& path) {
-  // (7/2)^2 (5/2)^2 (3/2)^2 (1/2)^2 / 8! of the eighth derivative, and the points along u weigh what those
-  // along v err.
-  constexpr double product = 43.06640625 / 40320, sum_of_weights = 1.4883;
-  const double along_u = product * std::pow(1 / path.nodes.density_u, 8) * std::pow(pi, 6),
-               along_v = product * std::pow(1.0 / cone_density, 8) * std::pow(pi, 6);
+  // Of the eighth derivative; the points of one axis weigh what those of the other err.
+  const double of_u = along_u(path.nodes).product * std::pow(1 / path.nodes.density_u, 8) * std::pow(pi, 6) *
+                      sups.second_u,
+               of_v = between_two.product * std::pow(1.0 / cone_density, 8) *
+                      eighth_along(sups, path.nodes.lean);
   out.value += v.weight * sups.value;
   out.weight = std::max(out.weight, v.weight);
   out.places += v.weight * (slope(sups.value, sups.second_u) * path.nodes.place_u +
                             slope(sups.value, sups.second_v) * path.nodes.place_v);
-  out.between += v.weight * (along_u * sups.second_u + sum_of_weights * along_v * sups.second_v);
+  out.between +=
+      v.weight * (path.nodes.lean > 0 ? between_two.sum * of_u + of_v : of_u + between_two.sum * of_v);
   for (std::size_t e = 0; e < 3; ++e) {
     const BetweenNodes& between = e < 2 ? path.path.across : path.path.along;
     if (between.made()) out.along[e] += v.weight * sups.value * lagrange_share(v, sups, e, between);
@@ -197,9 +214,10 @@ void add_nodes(NodeSums& out, const ViewOnBox& v, const Sups& sups, const ConePa
 
 // docs/error-bounds.md, "What verify does", "Cone beam": nodes, then what is made of them.
 void add_kinds(FieldBounds& b, const NodeSums& S, const ConePath& p) {
-  constexpr double weights = 1.4883 * 1.4883;  // sums of magnitudes of the points' weights, both ways
-  const double roundings =
-                   38 + 10 * p.nodes.cancellation + static_cast<double>(p.nodes.together + p.nodes.calls),
+  const EightPoints u = along_u(p.nodes);
+  const double weights = u.sum * between_two.sum,
+               roundings = 26 + u.roundings + between_two.roundings + 10 * p.nodes.cancellation +
+                           static_cast<double>(p.nodes.together + p.nodes.calls),
                node = S.places + S.between + weights * 1.01 * half_ulp * roundings * S.value +
                       weights * S.weight * p.host_rounding;
   const AxisNorms each;

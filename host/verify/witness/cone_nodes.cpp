@@ -156,13 +156,16 @@ VerifyConeNodes::Window VerifyConeNodes::window_of(const Nodes& wanted,
     }
     magnitude = std::max(magnitude, largest);
   });
-  // One place more on either side than the points need: fp32 may take the place beside.
+  // One place more on either side than the points need: fp32 may take the place beside. Of lines that lean
+  // the rows beyond their ends are read too, and sixteen rows have the same columns.
+  const std::int64_t beside = upright_ ? 1 : 2;
   const auto first = [&](std::size_t a) {
-    return static_cast<std::int64_t>(std::floor(table_place(a, low[a], density_[a]))) - points_before - 1;
+    return static_cast<std::int64_t>(std::floor(table_place(a, low[a], density_[a]))) - points_before -
+           beside;
   };
   const auto end = [&](std::size_t a) {
     return static_cast<std::int64_t>(std::floor(table_place(a, high[a], density_[a]))) + cone_points -
-           points_before + 1;
+           points_before + beside;
   };
   return {first(0), end(0) - first(0), first(1), up_to(end(1) - first(1), CosineTransform::together),
           magnitude};
@@ -288,7 +291,7 @@ namespace {
 struct Place {
   cl_float4 numbers{};
   int whole = 0;
-  double error = 0;
+  double reach = 0, error = 0;
 };
 
 // (n0 + sum_e n_e d_e) / (l0 + sum_e l_e d_e) less its value m in the middle is sum_e (n_e - m l_e) d_e over
@@ -299,24 +302,61 @@ struct Place {
 Place place_of(const ViewMatrix& m, std::size_t axis, const Vec3& seen, const Vec3& spacing,
                double lambda_min, double cancellation, double growth, std::int64_t first, double density) {
   Place out;
-  double reach = 0;
   for (std::size_t e = 0; e < 3; ++e) {
     const double step = (m[axis][e] - seen[axis] * m[2][e]) * spacing[e] * density;
     out.numbers.s[e] = static_cast<float>(step);
-    reach += std::abs(step) * half_block[e] / lambda_min;
+    out.reach += std::abs(step) * half_block[e] / lambda_min;
   }
-  const double middle = table_place(axis, seen[axis], density), whole = std::floor(middle - reach) - 1;
+  const double middle = table_place(axis, seen[axis], density), whole = std::floor(middle - out.reach) - 1;
   out.numbers.s[3] = static_cast<float>(middle - whole);
   out.whole = to_int(static_cast<std::int64_t>(whole) - first);
-  out.error = 1.01 * half_ulp * (reach * (10 + cancellation + 4 * growth) + 5);
+  out.error = 1.01 * half_ulp * (out.reach * (10 + cancellation + 4 * growth) + 5);
   return out;
 }
 
-/// One view's numbers about a block's middle; what they err, and how many rows of the table a step along z
-/// takes at most, are taken into account.
+/// The views of a launch: what they err, and what strips along the lines of columns of nodes would need.
+struct Launch {
+  ConeNodeFacts facts;
+  double row_step = 0;  // rows of the table from a height to the next one
+  double lean = 0;      // columns of the table a row
+  double place_u = 0;   // what places along u err where rows are interpolated along such lines
+
+  void add(const Launch& other) {
+    facts.place_u = std::max(facts.place_u, other.facts.place_u);
+    facts.place_v = std::max(facts.place_v, other.facts.place_v);
+    facts.cancellation = std::max(facts.cancellation, other.facts.cancellation);
+    row_step = std::max(row_step, other.row_step);
+    lean = std::max(lean, other.lean);
+    place_u = std::max(place_u, other.place_u);
+  }
+};
+
+// Places on eight rows lie at most half a place beyond the two points that their middle lies between
+// (docs/error-bounds.md).
+constexpr double most_lean = 0.12;
+
+// X of z at a node is the middle's less lambda's step times the way there. Both round by (12 + cancellation +
+// 4 growth) of their magnitudes, which are three times X_v at most; their quotient three times more.
+void look_along(const Place& u, const Place& v, double lambda_step, double lambda_min, double cancellation,
+                double growth, Launch& out) {
+  const double along_u = std::abs(static_cast<double>(u.numbers.s[2])) + lambda_step * u.reach,
+               of_v = std::abs(static_cast<double>(v.numbers.s[2])), along_v = of_v + lambda_step * v.reach,
+               least = of_v - lambda_step * v.reach;
+  out.row_step = std::max(out.row_step, along_v / lambda_min * (lambda_step > 0 ? cancellation : 1));
+  const double lean = least > 0.5 * of_v ? along_u / least : HUGE_VAL;
+  out.lean = std::max(out.lean, lean);
+  constexpr double rows = VDVR_VERIFY_CONE_STRIP;
+  const double slope = 4 * (12 + cancellation + 4 * growth) + 3,
+               along = u.error + lean * v.error +
+                       1.01 * half_ulp * (lean * ((rows + 8) * slope + 2 * rows) + 2 * u.reach + 8);
+  // Eight rows err by it each; and where the height's own place is wrong the line is.
+  out.place_u = std::max(out.place_u, sum_of_cone_weights * along + lean * v.error);
+}
+
+/// One view's numbers about a block's middle, which are taken into account.
 ViewNumbers numbers_about(const ViewMatrix& m, const Vec3& middle, const Vec3& spacing,
                           std::int64_t first_column, std::int64_t first_row,
-                          const std::array<double, 2>& density, ConeNodeFacts& facts, double& row_step) {
+                          const std::array<double, 2>& density, Launch& launch) {
   const Vec3 seen = projected(m, middle);
   double growth = 0;
   ViewNumbers out{};
@@ -333,10 +373,10 @@ ViewNumbers numbers_about(const ViewMatrix& m, const Vec3& middle, const Vec3& s
   out.u = at_u.numbers;
   out.v = at_v.numbers;
   out.whole = {{at_u.whole, at_v.whole, 0, 0}};
-  facts.place_u = std::max(facts.place_u, at_u.error);
-  facts.place_v = std::max(facts.place_v, at_v.error);
-  facts.cancellation = std::max(facts.cancellation, cancellation);
-  row_step = std::max(row_step, std::abs(static_cast<double>(at_v.numbers.s[2])) / least);
+  launch.facts.place_u = std::max(launch.facts.place_u, at_u.error);
+  launch.facts.place_v = std::max(launch.facts.place_v, at_v.error);
+  launch.facts.cancellation = std::max(launch.facts.cancellation, cancellation);
+  look_along(at_u, at_v, std::abs(m[2][2]) * spacing[2], least, cancellation, growth / least, launch);
   return out;
 }
 
@@ -353,10 +393,9 @@ void VerifyConeNodes::back_project(const Nodes& wanted, const Tiles& tiles, cons
   for (std::int64_t first = 0; first < all; first += together) {
     const std::int64_t n = std::min(together, all - first);
     std::vector<ViewNumbers> numbers(at(n * of_tile));
-    double row_step = 0;
+    Launch launch;
     parallel_for(n, {}, "", [&](std::int64_t t) {
-      ConeNodeFacts own;
-      double own_step = 0;
+      Launch own;
       for (std::int64_t b = 0; b < blocks; ++b) {
         if (tiles.blocks[at((first + t) * blocks + b)] == 0) continue;
         const cl_int2& node = tiles.first[at(first + t)];
@@ -367,13 +406,10 @@ void VerifyConeNodes::back_project(const Nodes& wanted, const Tiles& tiles, cons
         for (std::int64_t k = 0; k < table.filled; ++k)
           numbers[at((t * blocks + b) * table.filled + k)] =
               numbers_about(field_.views()[at(table.first_view + k)], middle, wanted.spacing,
-                            table.window.first_column, table.window.first_row, density_, own, own_step);
+                            table.window.first_column, table.window.first_row, density_, own);
       }
       const std::lock_guard guard(lock);
-      facts.place_u = std::max(facts.place_u, own.place_u);
-      facts.place_v = std::max(facts.place_v, own.place_v);
-      facts.cancellation = std::max(facts.cancellation, own.cancellation);
-      row_step = std::max(row_step, own_step);
+      launch.add(own);
     });
     const opencl::DeviceArray<ViewNumbers> on_device(state_, std::span<const ViewNumbers>(numbers),
                                                      "view positions");
@@ -386,10 +422,15 @@ void VerifyConeNodes::back_project(const Nodes& wanted, const Tiles& tiles, cons
                                .blocks = to_int(blocks),
                                .all_heights = to_int(wanted.heights),
                                .used = to_int(wanted.used)};
-    // Eight rows from each of a block's places on; places may round to the row beside. A device whose
-    // work-items have no caches of their own gains nothing.
-    const bool strips = upright_ && lanes == VDVR_VERIFY_CONE_HEIGHTS &&
-                        static_cast<double>(block - 1) * row_step + cone_points + 2 <= VDVR_VERIFY_CONE_STRIP;
+    // Eight rows from each of a block's places on, and where lines lean a row beside them; places may round
+    // to the row beside. A device whose work-items have no caches of their own gains nothing.
+    const double rows = static_cast<double>(block - 1) * launch.row_step + cone_points + 2;
+    const bool strips = lanes == VDVR_VERIFY_CONE_HEIGHTS && rows <= VDVR_VERIFY_CONE_STRIP &&
+                        (upright_ || launch.lean <= most_lean);
+    facts.place_u = std::max(facts.place_u, strips && !upright_ ? launch.place_u : launch.facts.place_u);
+    facts.place_v = std::max(facts.place_v, launch.facts.place_v);
+    facts.cancellation = std::max(facts.cancellation, launch.facts.cancellation);
+    if (strips && !upright_) facts.lean = std::max(facts.lean, launch.lean * density_[1] / density_[0]);
     const std::int64_t groups = strips ? blocks : up_to(wanted.used, VDVR_VERIFY_CONE_HEIGHTS) / lanes;
     opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrVerifyCone>
         kernel(state_, "verify/witness/verify_cone", "verify_cone",

@@ -18,6 +18,8 @@ namespace vdvr {
 /// Values of the table to a pixel, along u at least so many and along v, and points of Lagrange between them.
 constexpr std::int64_t cone_density = 6;
 constexpr int cone_points = 8;
+/// The sum of the magnitudes of their weights, at most, where the place lies between the two in the middle.
+constexpr double sum_of_cone_weights = 1.4883;
 
 /// Nodes to a cell of the grid with which they lie at most a quarter of the shortest wave's half apart, in
 /// every view at the covered region's rim: powers of two, the same for x and y. 2^24 where none does.
@@ -36,8 +38,11 @@ struct ConeNodeFacts {
   double density_u = cone_density;  ///< values of the table to a pixel along u
   double place_u = 0, place_v = 0;  ///< by how much places err, in pixels
   double cancellation = 1;          ///< largest sum of magnitudes of what lambda is made of, over lambda
-  std::int64_t together = 1;        ///< views that are summed before they are added to the others
-  std::int64_t calls = 1;           ///< so many such sums
+  /// Pixels along u for each along v by which the line of a column of nodes leans, at most, where rows are
+  /// interpolated along it; 0: nowhere.
+  double lean = 0;
+  std::int64_t together = 1;  ///< views that are summed before they are added to the others
+  std::int64_t calls = 1;     ///< so many such sums
 };
 
 class VerifyConeNodes {

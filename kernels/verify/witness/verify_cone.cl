@@ -71,36 +71,57 @@ static inline ALWAYS_INLINE Across look_across(__global const View* view, float 
 #endif
 
 #if VDVR_STRIPS
-#if VDVR_LANES != 8 || VDVR_VERIFY_CONE_BLOCK != 16 || !VDVR_UPRIGHT
-#error "a strip serves two vectors of eight heights of upright views"
+#if VDVR_LANES != 8 || VDVR_VERIFY_CONE_BLOCK != 16
+#error "a strip serves two vectors of eight heights"
 #endif
 
 // A block of heights as a view sees it: rows of its eight columns, weighted and added up, and by height the
-// first of its eight rows and the place between the middle two. The sums are those of ADD, to the bit.
+// first of its eight rows and the place between the middle two. Of upright views the sums are those of ADD,
+// to the bit. Where views lean, heights lie on a straight line that crosses columns: each row has the weights
+// of its place on that line, and what eight rows are interpolated from is q along it.
 typedef struct {
   float16 strip[VDVR_VERIFY_CONE_STRIP / 16];
   float part[VDVR_VERIFY_CONE_BLOCK];
+#if !VDVR_UPRIGHT
+  float weight[VDVR_VERIFY_CONE_BLOCK];  // lambda^-2
+#endif
   int row[VDVR_VERIFY_CONE_BLOCK];
 } Seen;
 
+#define SIXTEEN convert_float16((int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15))
+#if VDVR_UPRIGHT
 #define STRIP(j) vload16(0, from + (size_t)(j)*rows)
-static inline ALWAYS_INLINE void look_up(Seen* seen, __global const View* view, __global const float* plane,
-                                         float dx, float dy, int rows, int last_column, int last_row) {
-  const Across a = look_across(view, dx, dy);
-  const float16 dz = convert_float16((int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)) -
-                     0.5f * (float)(VDVR_VERIFY_CONE_BLOCK - 1);
-  const float4 v = view->v;
-  const float16 place =
-      fma(fma((float16)(v.z), dz, (float16)(fma(v.x, dx, v.y * dy))), (float16)(a.inverse), (float16)(v.w));
-  const int16 below = convert_int16(place),
-              row = clamp(view->whole.y + below - 3, (int16)(0), (int16)(last_row));
-  // Rows follow one another in z: rounding keeps order.
-  const int low = min(row.s0, row.sf), span = max(row.s0, row.sf) - low + 8,
-            chunks = min((span + 15) / 16, VDVR_VERIFY_CONE_STRIP / 16);
+#else
+#define STRIP(j) vload8(0, from + (size_t)(j)*rows)
+#endif
+// The strip's first row, and how many it has. Of upright views rows follow one another in z, and rounding
+// keeps their order; lambda's may change it.
+static inline ALWAYS_INLINE int2 take_places(Seen* seen, float16 place, int whole, int last_row) {
+  const int16 below = convert_int16(place), row = clamp(whole + below - 3, (int16)(0), (int16)(last_row));
+#if VDVR_UPRIGHT
+  const int low = min(row.s0, row.sf), high = max(row.s0, row.sf);
+#else
+  const int8 low8 = min(row.lo, row.hi), high8 = max(row.lo, row.hi);
+  const int4 low4 = min(low8.lo, low8.hi), high4 = max(high8.lo, high8.hi);
+  const int2 low2 = min(low4.lo, low4.hi), high2 = max(high4.lo, high4.hi);
+  const int low = min(low2.s0, low2.s1), high = max(high2.s0, high2.s1);
+#endif
   vstore16(place - convert_float16(below), 0, seen->part);
   vstore16(min(row - low, (int16)(VDVR_VERIFY_CONE_STRIP - 8)), 0, seen->row);
-  __global const float* from = plane + (size_t)clamp(a.column, 0, last_column) * rows + low;
-  for (int c = 0; c < chunks; ++c, from += 16) {
+  return (int2)(low, min(high - low + 8, VDVR_VERIFY_CONE_STRIP));
+}
+
+static inline ALWAYS_INLINE void look_up(Seen* seen, __global const View* view, __global const float* plane,
+                                         float dx, float dy, int rows, int last_column, int last_row) {
+  const float4 v = view->v;
+  const float16 dz = SIXTEEN - 0.5f * (float)(VDVR_VERIFY_CONE_BLOCK - 1);
+#if VDVR_UPRIGHT
+  const Across a = look_across(view, dx, dy);
+  const float16 place =
+      fma(fma((float16)(v.z), dz, (float16)(fma(v.x, dx, v.y * dy))), (float16)(a.inverse), (float16)(v.w));
+  const int2 strip = take_places(seen, place, view->whole.y, last_row);
+  __global const float* from = plane + (size_t)clamp(a.column, 0, last_column) * rows + strip.s0;
+  for (int c = 0; c < (strip.s1 + 15) / 16; ++c, from += 16) {
     float16 across = (float16)(a.weight.s1) * STRIP(1);
     across = fma((float16)(a.weight.s0), STRIP(0), across);
     across = fma((float16)(a.weight.s2), STRIP(2), across);
@@ -110,15 +131,49 @@ static inline ALWAYS_INLINE void look_up(Seen* seen, __global const View* view, 
     across = fma((float16)(a.weight.s6), STRIP(6), across);
     seen->strip[c] = fma((float16)(a.weight.s7), STRIP(7), across);
   }
+#else
+  const float4 u = view->u, lambda = view->lambda;
+  const float of = fma(lambda.x, dx, lambda.y * dy) + lambda.w, of_v = fma(v.x, dx, v.y * dy);
+  RECIPROCAL(float, inverse, of)
+  const float from_u = fma(u.x, dx, u.y * dy) * inverse, from_v = of_v * inverse,
+              rows_up = fma(-lambda.z, from_v, v.z);
+  RECIPROCAL(float, height_a_row, rows_up)
+  const float columns_a_row = fma(-lambda.z, from_u, u.z) * height_a_row;
+  const float16 of_height = fma((float16)(lambda.z), dz, (float16)(of));
+  RECIPROCAL(float16, inverses, of_height)
+  const float16 place = fma(fma((float16)(v.z), dz, (float16)(of_v)), inverses, (float16)(v.w));
+  const int2 strip = take_places(seen, place, view->whole.y, last_row);
+  vstore16(inverses * inverses, 0, seen->weight);
+  const float middle_u = from_u + u.w, middle_v = from_v + v.w;
+  float8* across = (float8*)seen->strip;
+  for (int c = 0; c < (strip.s1 + 7) / 8; ++c) {
+    // Where the line crosses the middle of eight rows, and from there the place of each. It is positive: rows
+    // that count lie so near to a height that it moves by less than a place.
+    const int first = strip.s0 + 8 * c;
+    const float at_u = fma(columns_a_row, (float)(first - view->whole.y) + 3.5f - middle_v, middle_u);
+    const int below = (int)at_u;
+    const float8 g = fma((float8)(columns_a_row), SIXTEEN.lo - 3.5f, (float8)(at_u - (float)below - 0.5f));
+    __global const float* from =
+        plane + (size_t)clamp(view->whole.x + below - 3, 0, last_column) * rows + first;
+    float8 sum = (float8)(0.0f);
+    ADD_POINTS(sum, g, STRIP)
+    across[c] = sum;
+  }
+#endif
 }
 
 #define FOR_PAIRS(DO) DO(0) DO(1) DO(2) DO(3)
 #define TAKE(n) float16 sum##n = vload16(n, of);
+#define OF_PAIR(values, n) (float16)((float8)(values[2 * n]), (float8)(values[2 * n + 1]))
+#if VDVR_UPRIGHT
+#define WEIGH(weights, n) weights
+#else
+#define WEIGH(weights, n) (OF_PAIR(weight, n) * weights)
+#endif
 #define ADD_ROWS(n)                                                                                   \
   {                                                                                                   \
-    const float16 place = (float16)((float8)(part[2 * n]), (float8)(part[2 * n + 1])),                \
-                  rows = (float16)(vload8(0, strip + row[2 * n]), vload8(0, strip + row[2 * n + 1])); \
-    sum##n = fma(lagrange_of_two(place), rows, sum##n);                                               \
+    const float16 rows = (float16)(vload8(0, strip + row[2 * n]), vload8(0, strip + row[2 * n + 1])); \
+    sum##n = fma(WEIGH(lagrange_of_two(OF_PAIR(part, n)), n), rows, sum##n);                          \
   }
 #define KEEP(n) vstore16(sum##n, n, of);
 // Adds some views at eight heights, from `first` of the block on, two of them in a vector.
@@ -127,6 +182,9 @@ static inline ALWAYS_INLINE void add_views(float* of, const Seen* seen, int view
   for (int i = 0; i < views; ++i) {
     const float *strip = (const float*)seen[i].strip, *part = seen[i].part + first;
     const int* row = seen[i].row + first;
+#if !VDVR_UPRIGHT
+    const float* weight = seen[i].weight + first;
+#endif
     FOR_PAIRS(ADD_ROWS)
   }
   FOR_PAIRS(KEEP)
