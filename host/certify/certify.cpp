@@ -31,7 +31,10 @@ void check_options(const CertifyOptions& options) {
       if (!((*build.roi)[a] < (*build.roi)[a + 3]))
         throw InputError(fmt::format("`roi`: {} is not below {}", (*build.roi)[a], (*build.roi)[a + 3]));
   if (build.refinement && build.window)
-    throw InputError("`window` leaves bricks without a bound, which refinement goes by: take one of the two");
+    throw InputError(
+        "`window` leaves bricks without a bound, and tolerances in sigma or of pictures go by bounds of "
+        "bricks: give "
+        "`epsilon` as a share of the range such as 3%, or no `window`");
   const PlanSettings& plan = options.plan;
   if (plan.levels == Levels::isotropic && plan.coarsening.value_or(LevelTriple{}) != LevelTriple{})
     throw InputError("`coarsening`: isotropic levels have the grid itself as their base");
@@ -130,8 +133,15 @@ BuildResult build_or_give_up(Device& device, const ProjectionSet& scan, Plan pla
 void refuse_empty_promise(const Certificate& c) {
   // A tested node has a share of each kind, if only of rounding: none at all means that nothing was tested
   // (but in a scan of nothing but zeros, whose range is 0).
-  if ((c.window || c.roi) && c.reference_range > 0 && c.measured_total == 0 && c.budget.gold.value == 0)
+  const bool tested = std::ranges::any_of(c.brick_totals, [](float total) { return total >= 0; }),
+             empty = c.reference_range > 0 && c.measured_total == 0 && c.budget.gold.value == 0;
+  if ((c.window || c.roi) && (empty || !tested))
     throw InputError("`window` or `roi` leaves no covered gold node to test: nothing would be certified");
+  if (!tested)
+    throw InputError(
+        "no gold node of the grid is covered by the scan, so that nothing would be certified; change "
+        "`origin`, "
+        "`size` or `center`");
   if (!c.holds_buffer && !c.comparison)
     throw ToleranceError(fmt::format(
         "the volume misses its tolerance: total {:.6g} > epsilon {:.6g} at {:.6g}, {:.6g}, {:.6g}",

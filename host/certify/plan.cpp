@@ -264,12 +264,21 @@ class Planner {
     plan_.not_covered_count = range.not_covered;
     plan_.not_covered_fraction =
         static_cast<double>(range.not_covered) / static_cast<double>(plan_.grid.sample_count());
-    // One plane of covered samples suffices; none does not.
-    if (range.not_covered == plan_.grid.sample_count() && plan_.grid.cells[2] > 1)
+    // One plane of covered samples suffices; none does not, but where all that is covered lies between two.
+    if (range.not_covered == plan_.grid.sample_count() &&
+        (plan_.grid.cells[2] > 1 || !is_seen_between_samples()))
       throw InputError("no sample of the grid is covered by the scan; change `origin`, `size` or `center`");
     plan_.reference_range = range.high - range.low;
     if (range.not_covered < plan_.grid.sample_count())
       plan_.range_at = {plan_.base.grid.position(range.low_at), plan_.base.grid.position(range.high_at)};
+  }
+
+  // Of one layer of cells, as of a single row.
+  [[nodiscard]] bool is_seen_between_samples() const {
+    const double low = plan_.grid.position({0, 0, 0})[2], high = plan_.grid.position({0, 0, 1})[2];
+    const std::vector<std::uint8_t> inside = covered_in_plane(plan_.grid, *coverage_);
+    return low <= coverage_->heights().second && high >= coverage_->heights().first &&
+           std::ranges::any_of(inside, [](std::uint8_t seen) { return seen != 0; });
   }
 
   // In units of the plan's own, the smallest.

@@ -148,6 +148,22 @@ BOOST_AUTO_TEST_CASE(a_window_that_no_value_meets_promises_nothing_and_is_refuse
   BOOST_TEST(names(why, "nothing would be certified"));
 }
 
+// All that a single row covers may lie between the samples of one layer of cells; beside it nothing is
+// covered.
+BOOST_AUTO_TEST_CASE(a_layer_of_cells_beside_what_is_covered_is_refused) {
+  const ProjectionSet row = simulated(sphere(4), 21, 1, 24);
+  CertifyOptions options;
+  options.grid.size = Index3{8, 8, 1};
+  options.grid.origin = Vec3{-4, -4, -0.75};
+  options.grid.spacing_z = 1.5;
+  BOOST_TEST(certify(device(), row, part_of_range(0.2), options).certificate.holds_buffer);
+  for (const Vec3& origin : {Vec3{-4, -4, 0.7}, Vec3{-4, -4, -2.3}, Vec3{30, -4, -0.75}}) {
+    options.grid.origin = origin;
+    const std::string why = refusal([&] { make_plan(device(), row, part_of_range(0.2), options); });
+    BOOST_TEST(names(why, "no sample of the grid is covered"), "'" << why << "'");
+  }
+}
+
 // Each names the field, not an option of the program.
 BOOST_AUTO_TEST_CASE(options_that_exclude_each_other_are_refused_by_name) {
   const auto refused = [](const std::string& field, const std::function<void(CertifyOptions&)>& change) {
