@@ -399,7 +399,10 @@ BuildResult build_in_units(Device& device, const ScanInUnits& of_scan, Plan plan
   if (plan.settings.comparison.closing == Closing::paper) settings.anisotropic = false;
   std::optional<Crew> crew;
   const bool all = 2 * std::count(selected.begin(), selected.end(), 1) > std::ssize(selected);
-  if (!options.crew.alone()) crew.emplace(device, *from, settings, options.crew, all);
+  if (!options.crew.alone()) {
+    settings.views_together = from->source(settings)->kept.views_together();
+    crew.emplace(device, *from, settings, options.crew, all);
+  }
   Crew* const others = crew ? &*crew : nullptr;
   watch.lap("crew");
   const FieldSlopes slopes = field_slopes(as_mixed(plan.base));

@@ -11,6 +11,7 @@
 #include <string>
 
 #include "host/base/system/casts.hpp"
+#include "host/certify/gold/gold_source.hpp"
 #include "host/certify/kept/kept_gold.hpp"
 #include "host/field/fbp/back_project.hpp"
 #include "tests/support/attack_chain.hpp"
@@ -322,6 +323,40 @@ BOOST_AUTO_TEST_CASE(nodes_whose_making_was_ended_are_made_again) {
       BOOST_TEST((found[0] == found[1]), (cone ? "cone" : "parallel") << (sparing ? ", sparing" : ""));
       BOOST_TEST(*std::ranges::max_element(found[0]) > 0);
     }
+}
+
+// All of a crew sum up as many views at once, whatever memory each has left: the same nodes.
+BOOST_AUTO_TEST_CASE(views_are_summed_up_as_another_device_does) {
+  ConeShape shape = orbit(60, 20, 24);
+  shape.views = 37;
+  const ProjectionSet scan = noisy_cone(shape, 5);
+  const Chain chain(scan);
+  const Grid grid = grid_of(Coverage(chain.filtered.geometry, chain.filtered.views), 1);
+  constexpr std::uint64_t little = std::uint64_t{9} << 20;
+  const auto made = [&](Device& on, std::int64_t together) {
+    GoldSettings settings = gold_settings(grid, 4, Rates{8, Interpolation::eight_taps, 4});
+    settings.views_together = together;
+    settings.base_only = true;
+    GoldSource source(on.state(), chain.filtered, chain.sups, settings);
+    KeptGold& kept = source.kept;
+    const GoldLattice lattice = kept.lattice(grid, 2);
+    const GoldBox box{{4, 5, 6}, {17, 9, 17}};
+    kept.prepare(lattice, {box}, {});
+    const std::int64_t stride = column_stride(box.nodes[2]);
+    opencl::DeviceArray<float> out(on.state(), count(box.nodes[0] * box.nodes[1] * stride), "gold");
+    out.fill(0.0f);
+    kept.fill(lattice, box, out, 0, stride);
+    return std::pair{kept.views_together(), out.to_host()};
+  };
+  Device own("", little);
+  const auto [fit, by_little] = made(own, 0);
+  BOOST_TEST(fit < ConeTiles::most_views);
+  const auto [most, by_much] = made(device(), 0);
+  BOOST_TEST(most == ConeTiles::most_views);
+  BOOST_TEST((by_much != by_little));
+  const auto [alike, as_little] = made(device(), fit);
+  BOOST_TEST(alike == fit);
+  BOOST_TEST((as_little == by_little));
 }
 
 }  // namespace

@@ -47,6 +47,9 @@ struct GoldSettings {
   /// Of estimates: where gold is kept, the rest counting as 0; all of it where there is none.
   std::optional<PlanePart> part{};
   double least_reach = 0;  ///< of kept gold: what later settings will ask for
+  /// Of cone beam, that are summed up together; 0: as many as memory allows. How sums round depends on it, so
+  /// that all of a crew take as many.
+  std::int64_t views_together = 0;
   /// How far outside the covered region samples are kept: as far as a base cell that meets it reaches.
   [[nodiscard]] double kept() const {
     return 0.5 * (kept_margin(grid, 1) + kept_margin(coarsened(grid, coarsening), 1));

@@ -27,6 +27,7 @@ GoldSource::GoldSource(opencl::State& state, const FilteredScan& scan, const Fie
     : kept(state, scan, sups, settings.grid, gold_reach(settings), settings.upsampling,
            settings.interpolation, settings.heights_bytes) {
   if (settings.part) kept.keep_only(*settings.part);
+  if (settings.views_together > 0) kept.take_views_together(settings.views_together);
   if (!settings.base_only) remainder.emplace(state, kept, scan, sups, settings.grid, settings.granularity);
 }
 

@@ -111,7 +111,7 @@ ConeTiles::ConeTiles(opencl::State& state, const FilteredScan& scan, Upsampler& 
   if (DenseValues::suit(state, scan.geometry, fewest_rows))
     dense_.emplace(state, upsampler, scan, columns_, rows_);
   column_stride_ = column_stride(table_rows_.count + heights);
-  views_together_ = views_together();
+  views_together_ = views_that_fit();
 }
 
 // Places, frequencies and weights of all views, part by part of the region.
@@ -266,7 +266,7 @@ void ConeTiles::look_at_axis(std::size_t axis, const Coverage& coverage) {
 // --- tables ---
 
 // Decided once: what sums err depends on it.
-std::int64_t ConeTiles::views_together() const {
+std::int64_t ConeTiles::views_that_fit() const {
   const std::uint64_t table = sizeof(float) * count(columns_.count * dense_stride()),
                       upright = upright_views_ ? sizeof(float) * count(plane()) : 0,
                       each = table + (dense_ ? dense_->bytes(1) : table) + upright,

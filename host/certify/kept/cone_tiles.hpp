@@ -67,6 +67,10 @@ class ConeTiles {
   /// From now on without strips, as devices do whose work-items share caches: for tests.
   void take_no_strips() { in_runs_ = false; }
   [[nodiscard]] bool in_runs() const { return in_runs_; }
+  /// In tables at once, whose nodes are summed up before they are added to the others; as memory allows
+  /// unless taken otherwise, before anything is back-projected.
+  [[nodiscard]] std::int64_t views_together() const { return views_together_; }
+  void take_views_together(std::int64_t views) { views_together_ = views; }
 
   /// At least sum_k lambda^-2 sup |q_k| wherever bounds hold.
   [[nodiscard]] double sup() const { return sup_; }
@@ -121,7 +125,7 @@ class ConeTiles {
   [[nodiscard]] std::int64_t dense_stride() const {
     return upright_views_ ? column_stride(rows_.count + VDVR_CONE_HEIGHTS) : column_stride_;
   }
-  [[nodiscard]] std::int64_t views_together() const;
+  [[nodiscard]] std::int64_t views_that_fit() const;
   using NodesKernel = opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl_ulong, VdvrConeNodes>;
   [[nodiscard]] NodesKernel nodes_kernel(int lanes);
   [[nodiscard]] Table table(std::int64_t first, std::int64_t views);

@@ -103,6 +103,11 @@ class KeptGold {
   /// From now on, of cone beam, prepare() makes what boxes read and no more of their tiles: for those who ask
   /// for some places. Nodes are the same to the bit.
   void make_only_what_is_read() { sparing_ = cone_.has_value(); }
+  /// Of cone beam, that are summed up together: as memory allows, or as another device does. Else 0.
+  [[nodiscard]] std::int64_t views_together() const { return cone_ ? cone_->views_together() : 0; }
+  void take_views_together(std::int64_t views) {
+    if (cone_) cone_->take_views_together(views);
+  }
   /// Then the next prepare() that misses anything makes that for these boxes too: its views are upsampled
   /// once.
   void will_read(const GoldLattice& lattice, const std::vector<GoldBox>& boxes);
