@@ -26,7 +26,8 @@ bool passes(const BrickMeasure& m, double tolerance) {
   return m.total < 0 || static_cast<double>(m.total) <= tolerance;
 }
 
-// The failing cells of a brick on gold of twice the rate.
+}  // namespace
+
 CellBox cells_of_finer(CellBox open) {
   const auto twice = [](std::int16_t n) {
     return static_cast<std::int16_t>(std::min<int>(2 * std::max<int>(n, 0), INT16_MAX));
@@ -36,16 +37,13 @@ CellBox cells_of_finer(CellBox open) {
   return open;
 }
 
-// Measured on finer gold than before, where cells failed. Cells that only the coarser gold tested hold no
-// point of which a certificate speaks.
+// Cells that only the coarser gold tested hold no point of which a certificate speaks.
 BrickMeasure on_finer_too(const BrickMeasure& before, BrickMeasure now) {
   now.total = std::clamp(std::max(now.total, before.passed), 0.0f, before.total);
   now.passed = std::max(now.passed, before.passed);
   now.error = std::max(now.error, before.error);
   return now;
 }
-
-}  // namespace
 
 Verdict verdict_of(const BrickMeasure& m, double tolerance) {
   // Each rate's total bounds |V - F|: what passes here has passed.

@@ -18,6 +18,10 @@ namespace vdvr {
 enum class Verdict { within, beyond, undecided };
 /// Of a field measured at one rate of gold. Beyond: at one of its nodes, which are nodes of finer gold too.
 Verdict verdict_of(const BrickMeasure& m, double tolerance);
+/// The box of a brick's failing cells on gold of twice the rate.
+CellBox cells_of_finer(CellBox open);
+/// A brick that was measured on finer gold than before, in the box of the cells that failed there.
+BrickMeasure on_finer_too(const BrickMeasure& before, BrickMeasure now);
 
 class ClassifyBricks {
  public:

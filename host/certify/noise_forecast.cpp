@@ -40,7 +40,10 @@ SigmaRange range_of(const Volume& sigma, const std::vector<std::uint8_t>& seen) 
   for (std::size_t i = 0; i < seen.size(); ++i)
     if (seen[i]) covered.push_back(sigma.samples[i]);
   if (covered.empty())
-    throw InputError("no sample of the grid is covered by the scan; change `origin`, `size` or `center`");
+    throw InputError(
+        "no corner of a brick is covered by the scan, and there the noise is told: take a smaller `spacing` "
+        "or "
+        "`granularity`, or change `origin`, `size` or `center`");
   std::sort(covered.begin(), covered.end());
   return {static_cast<double>(covered.front()), static_cast<double>(covered[covered.size() / 2]),
           static_cast<double>(covered.back())};
