@@ -17,10 +17,10 @@ Clip covered_clip(const Arguments& args, const Scene& scene, const Progress& pro
   const auto named = covered_of(args, scene, progress);
   const auto& covered = named ? named : scene.certificate->covered;
   if (!covered)
-    throw InputError(
-        fmt::format("{}: does not say where it is covered, since an earlier version wrote it; "
-                    "name its scan by --covered-from, or build it again",
-                    name));
+    throw InputError(fmt::format(
+        "{}: does not say where it is covered: what a single row covers has no height, and earlier "
+        "versions did not say; of the latter name the scan by --covered-from, or build it again",
+        name));
   return certified_part(*covered, *scene.certificate);
 }
 

@@ -67,8 +67,9 @@ Clip covered_part(const Certificate& here, const PictureRequest& request) {
   const auto covered = here.covered ? here.covered : request.covered;
   if (!covered)
     throw InputError(
-        "the volume does not say where it is covered, since an earlier version wrote it; name its scan by "
-        "`covered_from`, or build it again");
+        "the volume does not say where it is covered: what a single row covers has no height, and earlier "
+        "versions "
+        "did not say; of the latter name the scan by `covered_from`, or build it again");
   return certified_part(*covered, here);
 }
 
