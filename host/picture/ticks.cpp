@@ -48,8 +48,10 @@ int exponent_of(double magnitude) {
 
 Ticks ends_of(double lo, double hi) {
   Ticks ends;
-  ends.ticks.push_back({lo, with_minus(fmt::format("{:.4g}", lo))});
-  std::string high = with_minus(fmt::format("{:.4g}", hi));
+  ends.exponent = exponent_of(std::max(std::abs(lo), std::abs(hi)));
+  const double unit = std::pow(10.0, ends.exponent);
+  ends.ticks.push_back({lo, with_minus(fmt::format("{:.4g}", lo / unit))});
+  std::string high = with_minus(fmt::format("{:.4g}", hi / unit));
   if (high != ends.ticks.front().label) ends.ticks.push_back({hi, std::move(high)});
   return ends;
 }

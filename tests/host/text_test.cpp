@@ -155,6 +155,10 @@ BOOST_AUTO_TEST_CASE(ticks_are_round_few_and_told_apart) {
 BOOST_AUTO_TEST_CASE(ranges_that_have_no_round_numbers_show_their_ends) {
   BOOST_TEST(round_ticks(3, 3, 5).ticks.size() == 1u);
   BOOST_TEST(round_ticks(1e6, 1e6 + 1e-8, 5).ticks.size() == 1u);
+  const Ticks small = round_ticks(-4.1e-7, 4.1e-7, 2);
+  BOOST_TEST(small.exponent == -7);
+  BOOST_TEST(small.ticks.size() == 2u);
+  BOOST_TEST(small.ticks.back().label == "4.1");
   BOOST_TEST(round_ticks(1, 0, 5).ticks.empty());
   BOOST_TEST(round_ticks(0, std::numeric_limits<double>::infinity(), 5).ticks.empty());
   BOOST_TEST(round_ticks(std::nan(""), 1, 5).ticks.empty());
