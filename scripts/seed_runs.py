@@ -18,8 +18,7 @@ def run_chunk(command, first, count, limit, done):
     `limit` seconds names its seed, and another one goes on behind it."""
     end = first + count
     while first < end:
-        process = subprocess.Popen(command + [str(end - first), "--first", str(first), "--json"] if "--program" in command else
-                                   command + [str(end - first), str(first), "--json"],
+        process = subprocess.Popen(command + [str(end - first), str(first), "--json"],
                                    stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
         text, hangs, told = b"", False, time.monotonic()
         while True:
@@ -58,9 +57,9 @@ def add_options(parser, program, count, chunk):
     parser.add_argument("--log", help="a JSON line per seed goes here")
 
 
-def run(parser, print_failures, interpreter=()):
-    """The records of all seeds in any order, and the seconds they took. `print_failures` sees each as it comes. With an
-    `interpreter`, words, it is what runs the seeds and is told of the program."""
+def run(parser, print_failures, script=None):
+    """The records of all seeds in any order, and the seconds they took. `print_failures` sees each as it comes. A `script`
+    runs the seeds in place of the program, which it is told of."""
     options = parser.parse_args()
     if options.count < 1 or options.jobs < 1 or options.chunk < 1:
         parser.error("COUNT, --jobs and --chunk must be at least 1")
@@ -68,7 +67,7 @@ def run(parser, print_failures, interpreter=()):
         sys.exit("%s is missing: cmake --build build --target %s" %
                  (options.program, os.path.basename(options.program)))
     log = open(options.log, "w") if options.log else None
-    command = [*interpreter, "--program", options.program] if interpreter else [options.program]
+    command = [script, "--program", options.program] if script else [options.program]
     command += ["--cone"] if getattr(options, "cone", False) else []
     records, lock, work = [], threading.Lock(), queue.Queue()
     for first in range(options.first, options.first + options.count, options.chunk):

@@ -157,7 +157,7 @@ VerifyConeNodes::Window VerifyConeNodes::window_of(const Nodes& wanted,
     magnitude = std::max(magnitude, largest);
   });
   // One place more on either side than the points need: fp32 may take the place beside. Of lines that lean
-  // the rows beyond their ends are read too, and sixteen rows have the same columns.
+  // the rows beyond their ends are read too, and eight rows have the same columns.
   const std::int64_t beside = upright_ ? 1 : 2;
   const auto first = [&](std::size_t a) {
     return static_cast<std::int64_t>(std::floor(table_place(a, low[a], density_[a]))) - points_before -
@@ -422,8 +422,8 @@ void VerifyConeNodes::back_project(const Nodes& wanted, const Tiles& tiles, cons
                                .blocks = to_int(blocks),
                                .all_heights = to_int(wanted.heights),
                                .used = to_int(wanted.used)};
-    // Eight rows from each of a block's places on, and where lines lean a row beside them; places may round
-    // to the row beside. A device whose work-items have no caches of their own gains nothing.
+    // Eight rows from each of a block's places on; places may round to the row beside. A device whose
+    // work-items have no caches of their own gains nothing.
     const double rows = static_cast<double>(block - 1) * launch.row_step + cone_points + 2;
     const bool strips = lanes == VDVR_VERIFY_CONE_HEIGHTS && rows <= VDVR_VERIFY_CONE_STRIP &&
                         (upright_ || launch.lean <= most_lean);
