@@ -143,3 +143,18 @@ BOOST_AUTO_TEST_CASE(run_writes_the_certificate_and_the_pictures) {
   BOOST_TEST(certificate["holds"]["buffer"].get<bool>());
   BOOST_TEST(json["error_slice"]["max_error"].get<double>() <= certificate["epsilon_abs"].get<double>());
 }
+
+// Nodes around what is covered are tested too: of this scan the one that errs most lies beside it.
+BOOST_AUTO_TEST_CASE(run_draws_the_error_where_the_scan_covers) {
+  const std::string scan = at("few-rows"), output = at("run-few-rows");
+  const Ended made = run({"simulate", "--phantom", "shepp-logan", "--pitch", ".05", "--cone", "20,30",
+                          "--detector", "49x7", "--angles", "30", "--tilt", "2,-1", "-o", scan});
+  BOOST_TEST_CONTEXT(made.err) { BOOST_REQUIRE(made.code == 0); }
+  const Ended r = run({"run", scan, "--epsilon", "15%", "-o", output, "--json"});
+  BOOST_TEST_CONTEXT(r.err) { BOOST_REQUIRE(r.code == 0); }
+  const auto certificate = nlohmann::json::parse(bytes_of(fs::path(output) / "certificate.json"));
+  const auto z = certificate["covered"]["z"];
+  const double worst = certificate["worst_at"][2].get<double>();
+  BOOST_TEST((worst < z[0].get<double>() || worst > z[1].get<double>()));
+  BOOST_TEST(nlohmann::json::parse(r.out)["error_slice"]["max_error"].get<double>() > 0);
+}

@@ -56,12 +56,21 @@ std::vector<std::string> file_names() {
           "components.png", "report.html", "certificate.json"};
 }
 
+/// Of the slice through the node that errs most. Nodes around what is covered are tested too, and a slice
+/// beside it shows nothing: it lies inside by more than rounding.
+double height_of_worst(const Certificate& c) {
+  if (!c.covered) return c.worst_at[2];
+  const auto& [low, high] = c.covered->z;
+  const double inside = 1e-3 * (high - low);
+  return std::clamp(c.worst_at[2], low + inside, high - inside);
+}
+
 /// Where the noise is known: the bounds in its units, on the error picture's slice.
 void draw_noise(const OutputFolder& folder, Outcome& out) {
   const Certificate& c = out.built.certificate;
   if (!c.noise) return;
   const ErrorSlice slice =
-      bound_slice(out.built.volume, c, false, {2, c.worst_at[2], kPictureSide, kPictureSide},
+      bound_slice(out.built.volume, c, false, {2, height_of_worst(c), kPictureSide, kPictureSide},
                   BrickQuantity::bound_in_sigma);
   write_png(folder.file("noise.png"), slice.image);
   out.files.emplace_back("noise.png",
@@ -134,11 +143,11 @@ void draw_pictures(Device& device, const OutputFolder& folder, Outcome& out, con
     o.camera = orbit_camera(frame_view(volume, o, 0, 89), 0, 89, 1);
     draw("dvr.png", "direct volume rendering without light, nearly along the axis");
   }
+  const double height = height_of_worst(out.built.certificate);
   out.error = error_slice(device, out.planned.scan, volume, out.built.certificate,
-                          {2, out.built.certificate.worst_at[2], kPictureSide, kPictureSide}, progress);
+                          {2, height, kPictureSide, kPictureSide}, progress);
   write_png(folder.file("error.png"), out.error.image);
-  out.files.emplace_back(
-      "error.png", fmt::format("|V - F| on the slice at z = {:.4g}", out.built.certificate.worst_at[2]));
+  out.files.emplace_back("error.png", fmt::format("|V - F| on the slice at z = {:.4g}", height));
   draw_noise(folder, out);
 }
 
