@@ -27,18 +27,19 @@ typedef struct {
   int pad;
 } VdvrAlongZ;
 
-// Equal boxes, one behind the other.
+// Equal boxes, one behind the other. An interval lies between kept columns; along an axis where gold is no
+// denser than these, it is one node of gold.
 typedef struct {
-  vdvr_count in_first, out_first;
-  vdvr_count in_box, out_box;                           // from box to box
-  vdvr_count in_along, in_other, out_along, out_other;  // along the filter's axis, and across it
-  int boxes;
-  int others, z;  // columns across the axis, and heights, a multiple of 16
-  int intervals;  // between input nodes, each with its outputs from its low node on
-  int step;       // input nodes from one interval to the next
-  int skipped;    // outputs before the first that is wanted
-  int outputs;    // wanted
-  int phases;     // outputs to an interval
+  vdvr_count in_box, out_first, out_box;  // from box to box
+  vdvr_count in_x, in_y, out_x, out_y;    // from column to column
+  int boxes, z;                           // heights, a multiple of 16
+  int kept_x, intervals_x;                // of a box
+  int chunk, chunks, columns;             // intervals along x of a work-item; these of a row; its room
+  int step_x, step_y;                     // kept columns from one interval to the next
+  int skipped_x, skipped_y;               // outputs before the first that is wanted
+  int outputs_x, outputs_y;               // wanted
+  int phases_x, phases_y;                 // outputs to an interval
+  int pad;
 } VdvrAcross;
 
 #endif

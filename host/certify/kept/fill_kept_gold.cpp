@@ -157,8 +157,8 @@ void KeptGold::resample_heights(const GoldLattice& lattice, const GoldBox& box) 
   heights_ = std::move(h);
 }
 
-opencl::DeviceArray<float>& KeptGold::buffer(std::size_t which, std::uint64_t size) {
-  opencl::DeviceArray<float>& b = buffers_[which];
+opencl::DeviceArray<float>& KeptGold::heights_buffer(std::uint64_t size) {
+  opencl::DeviceArray<float>& b = buffer_;
   if (b.size() < size) {
     b = {};  // before the next one is allocated
     b = opencl::DeviceArray<float>(state_, size, "gold between its nodes");
@@ -167,14 +167,14 @@ opencl::DeviceArray<float>& KeptGold::buffer(std::size_t which, std::uint64_t si
   return b;
 }
 
-const Across& KeptGold::across_of(int phases, std::size_t axis) {
+const AcrossWeights& KeptGold::across_of(int phases, std::size_t axis) {
   const std::pair key{phases, axis};
   if (const auto known = across_.find(key); known != across_.end()) return known->second;
   const GoldFilter& f = filter_of(phases, axis);
   return across_
-      .emplace(key, Across(state_, phases, f.taps,
-                           std::span<const float>(f.weights).subspan(
-                               at(std::min(f.taps, to_int(static_cast<std::int64_t>(f.weights.size())))))))
+      .emplace(key, AcrossWeights(state_, phases, f.taps,
+                                  std::span<const float>(f.weights).subspan(at(std::min(
+                                      f.taps, to_int(static_cast<std::int64_t>(f.weights.size())))))))
       .first->second;
 }
 
@@ -233,8 +233,8 @@ void KeptGold::fill(const GoldLattice& lattice, std::span<const GoldBox> boxes,
         span(lattice, 0, box).skipped != x.skipped || span(lattice, 1, box).skipped != y.skipped)
       throw std::logic_error("KeptGold: boxes that differ");
   resample_heights(lattice, one);
-  const std::uint64_t largest = count(x.count * std::max(y.count, one.nodes[1]) * heights_->padded);
-  // A twelfth of what is left each, of the two arrays that are made.
+  const std::uint64_t largest = count(x.count * y.count * heights_->padded);
+  // A twelfth of what is left.
   const std::uint64_t floats =
       state_.info.is_cpu ? floats_together
                          : std::clamp(state_.memory.left() / 48, floats_together, most_floats_of_card);
@@ -252,40 +252,28 @@ void KeptGold::fill_together(const GoldLattice& lattice, std::span<const GoldBox
   const GoldBox& box = boxes.front();
   const Span x = span(lattice, 0, box), y = span(lattice, 1, box);
   const std::int64_t padded = heights_->padded;
-  const std::uint64_t of_heights = count(x.count * y.count * padded),
-                      of_rows = count(x.count * box.nodes[1] * padded);
-  const opencl::DeviceArray<float>& heights = buffer(0, boxes.size() * of_heights);
+  const opencl::DeviceArray<float>& heights =
+      heights_buffer(boxes.size() * count(x.count * y.count * padded));
   take_heights(lattice, boxes, heights);
-  const opencl::DeviceArray<float>& rows = buffer(1, boxes.size() * of_rows);
-  VdvrAcross along_y{};
-  along_y.in_box = of_heights;
-  along_y.out_box = of_rows;
-  along_y.boxes = to_int(static_cast<std::int64_t>(boxes.size()));
-  along_y.in_along = along_y.out_along = count(x.count * padded);
-  along_y.in_other = along_y.out_other = count(padded);
-  along_y.others = to_int(x.count);
-  along_y.z = to_int(padded);
-  along_y.intervals = to_int(y.intervals);
-  along_y.step = lattice.step[1];
-  along_y.skipped = to_int(y.skipped);
-  along_y.outputs = to_int(box.nodes[1]);
-  across_of(lattice.phases[1], 1)(state_, heights, rows, along_y);
-  VdvrAcross along_x{};
-  along_x.in_box = of_rows;
-  along_x.out_box = apart;
-  along_x.boxes = along_y.boxes;
-  along_x.in_along = count(padded);
-  along_x.in_other = count(x.count * padded);
-  along_x.out_first = first;
-  along_x.out_along = count(stride);
-  along_x.out_other = count(box.nodes[0] * stride);
-  along_x.others = to_int(box.nodes[1]);
-  along_x.z = to_int(padded);
-  along_x.intervals = to_int(x.intervals);
-  along_x.step = lattice.step[0];
-  along_x.skipped = to_int(x.skipped);
-  along_x.outputs = to_int(box.nodes[0]);
-  across_of(lattice.phases[0], 0)(state_, rows, out, along_x);
+  VdvrAcross shape{};
+  shape.in_box = count(x.count * y.count * padded);
+  shape.in_x = count(padded);
+  shape.in_y = count(x.count * padded);
+  shape.out_first = first;
+  shape.out_box = apart;
+  shape.out_x = count(stride);
+  shape.out_y = count(box.nodes[0] * stride);
+  shape.boxes = to_int(static_cast<std::int64_t>(boxes.size()));
+  shape.z = to_int(padded);
+  shape.kept_x = to_int(x.count);
+  shape.intervals_x = to_int(x.intervals);
+  shape.step_x = lattice.step[0];
+  shape.step_y = lattice.step[1];
+  shape.skipped_x = to_int(x.skipped);
+  shape.skipped_y = to_int(y.skipped);
+  shape.outputs_x = to_int(box.nodes[0]);
+  shape.outputs_y = to_int(box.nodes[1]);
+  fill_across(state_, across_of(lattice.phases[0], 0), across_of(lattice.phases[1], 1), heights, out, shape);
 }
 
 }  // namespace vdvr

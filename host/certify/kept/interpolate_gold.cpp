@@ -14,11 +14,13 @@
 
 namespace vdvr {
 
-static_assert(sizeof(VdvrColumns) == 24 && sizeof(VdvrAlongZ) == 56 && sizeof(VdvrAcross) == 96);
+static_assert(sizeof(VdvrColumns) == 24 && sizeof(VdvrAlongZ) == 56 && sizeof(VdvrAcross) == 120);
 
 namespace {
 
 constexpr std::int64_t lanes_of_group = 16;
+// Bytes of local memory for kept columns of a work-group: half of what every device has.
+constexpr std::uint64_t room = std::uint64_t{16} << 10;
 
 opencl::Defines defines(int lanes, int taps) {
   return {{"VDVR_LANES", std::to_string(lanes)},
@@ -26,11 +28,10 @@ opencl::Defines defines(int lanes, int taps) {
           {"VDVR_TAPS", std::to_string(taps)}};
 }
 
-// Of the phases between two nodes, a work-item sums so many at a time, for which there is a kernel: sums that
-// do not wait for each other.
-int phases_together(int phases) {
-  return phases <= 2 ? 1 : phases == 4 ? 3 : phases == 8 ? 7 : phases == 16 ? 5 : 4;
-}
+// Of the phases between two nodes, a work-item sums so many at a time, for which there is a kernel. Where
+// there is one, two intervals at a time: sums that share what they read.
+int phases_together(int phases) { return phases <= 2 ? 1 : phases == 4 ? 3 : 4; }
+int intervals_together(int phases) { return phases <= 2 ? 2 : 1; }
 
 // Eight columns have as many sums, and sixteen beside them: of vectors that take two registers each they do
 // not fit into those of a CPU with 8 lanes.
@@ -108,27 +109,39 @@ void AlongZ::operator()(opencl::State& state, const opencl::DeviceArray<float>& 
          out.buffer(), in.buffer(), weights_.buffer(), first_.buffer(), on_device.buffer(), shape);
 }
 
-Across::Across(opencl::State& state, int phases, int taps, std::span<const float> weights)
-    : phases_(phases),
-      taps_(taps),
-      weights_(state, std::span<const float>(padded(phases, taps, weights)), "weights of gold") {}
+AcrossWeights::AcrossWeights(opencl::State& state, int phases_of, int taps_of, std::span<const float> weights)
+    : phases(phases_of),
+      taps(taps_of),
+      values(state, std::span<const float>(padded(phases_of, taps_of, weights)), "weights of gold") {}
 
-void Across::operator()(opencl::State& state, const opencl::DeviceArray<float>& in,
-                        const opencl::DeviceArray<float>& out, VdvrAcross shape) const {
-  shape.phases = phases_;
-  const int lanes = column_tuning(state.info).lanes;
-  // Intervals side by side read nearly the same nodes: one after another where a box does not stay in the
-  // second cache meanwhile.
-  constexpr std::uint64_t cache = std::uint64_t{512} << 10;
-  const bool is_large = 4 * count(shape.z) * count(shape.others) * count(shape.intervals) > cache;
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, VdvrAcross> kernel(
-      state, "certify/kept/interpolate", fmt::format("across_{}", phases_together(phases_)),
-      defines(lanes, taps_));
-  kernel(opencl::in_groups(state.info,
-                           {count(shape.z / lanes), count(shape.others),
-                            count(std::int64_t{shape.intervals} * shape.boxes)},
-                           {1, is_large ? 1U : 4U, is_large ? 16U : 4U}),
-         out.buffer(), in.buffer(), weights_.buffer(), shape);
+void fill_across(opencl::State& state, const AcrossWeights& x, const AcrossWeights& y,
+                 const opencl::DeviceArray<float>& in, const opencl::DeviceArray<float>& out,
+                 VdvrAcross shape) {
+  if (x.taps != y.taps) throw std::logic_error("fill_across: filters of different lengths");
+  shape.phases_x = x.phases;
+  shape.phases_y = y.phases;
+  const int lanes = column_tuning(state.info).lanes, beside = intervals_together(x.phases);
+  const auto columns = [&](std::int64_t intervals) {
+    return (((intervals + beside - 2) * shape.step_x + x.taps) + 3) / 4 * 4;
+  };
+  opencl::Range range =
+      opencl::in_groups(state.info, {count(shape.z / lanes), count(shape.outputs_y), count(shape.boxes)},
+                        {lanes > 1 ? 1U : 16U, 1, 1});
+  // Of a row as much as finds room; on a CPU the whole row does.
+  const std::uint64_t a_column = 4 * count(lanes) * range.local[0] * range.local[1] * range.local[2];
+  std::int64_t most = 1;
+  while (most < shape.intervals_x && count(columns(most + 1)) * a_column <= room) ++most;
+  const std::int64_t chunks = (shape.intervals_x + most - 1) / most,
+                     chunk = (shape.intervals_x + chunks - 1) / chunks;
+  shape.chunks = to_int(chunks);
+  shape.chunk = to_int(chunk);
+  shape.columns = to_int(columns(chunk));
+  range.global[2] *= count(chunks);
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrAcross, cl::LocalSpaceArg> kernel(
+      state, "certify/kept/interpolate", fmt::format("across_{}", phases_together(x.phases)),
+      defines(lanes, x.taps));
+  kernel(range, out.buffer(), in.buffer(), x.values.buffer(), y.values.buffer(), shape,
+         cl::Local(count(shape.columns) * a_column));
 }
 
 }  // namespace vdvr

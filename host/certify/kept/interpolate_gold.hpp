@@ -44,19 +44,20 @@ class AlongZ {
   std::int64_t terms_ = 0, groups_ = 0;
 };
 
-/// Filters across z. `weights` float[phase - 1][taps] as gold_filters.hpp has them; `phases` outputs an
-/// interval, which half of the taps lie before.
-class Across {
- public:
-  Across(opencl::State& state, int phases, int taps, std::span<const float> weights);
-  /// Phases of `shape` are not read. Enqueues. Cost: `taps` multiply-adds an output; error: taps + 1
-  /// roundings of sum |weight| |input|.
-  void operator()(opencl::State& state, const opencl::DeviceArray<float>& in,
-                  const opencl::DeviceArray<float>& out, VdvrAcross shape) const;
-
- private:
-  int phases_ = 1, taps_ = 2;
-  opencl::DeviceArray<float> weights_;
+/// Of a filter along x or y, on the device: float[phase - 1][taps] as gold_filters.hpp has them, of which
+/// half lie before the `phases` outputs of an interval.
+struct AcrossWeights {
+  AcrossWeights(opencl::State& state, int phases, int taps, std::span<const float> weights);
+  int phases = 1, taps = 2;
+  opencl::DeviceArray<float> values;
 };
+
+/// Gold between kept columns: along y, and of what that gives along x, in one launch. Phases, chunks and room
+/// of `shape` are not read. Throws std::logic_error where the filters' taps differ. Enqueues. Cost: `taps`
+/// multiply-adds a kept column of every row of gold, and a node; error: along either axis taps + 1 roundings
+/// of sum |weight| |input|.
+void fill_across(opencl::State& state, const AcrossWeights& x, const AcrossWeights& y,
+                 const opencl::DeviceArray<float>& in, const opencl::DeviceArray<float>& out,
+                 VdvrAcross shape);
 
 }  // namespace vdvr

@@ -204,7 +204,7 @@ class KeptGold {
   void make_common_heights(const Progress& progress);
   [[nodiscard]] std::pair<std::int64_t, std::int64_t> all_heights() const;
   void begin_run(std::int64_t low, std::int64_t heights);
-  const Across& across_of(int phases, std::size_t axis);
+  const AcrossWeights& across_of(int phases, std::size_t axis);
   const GoldFilter& filter_of(int phases, std::size_t axis);
   void resample_heights(const GoldLattice& lattice, const GoldBox& box);
   void require_run(const Span& z);
@@ -233,7 +233,7 @@ class KeptGold {
   GoldErrors cone_errors(const GoldLattice& lattice);
   GoldErrors parallel_errors(const GoldLattice& lattice, Fp64 fp64);
   void back_project_heights(std::span<const TileAt> tiles, const Progress& progress);
-  opencl::DeviceArray<float>& buffer(std::size_t which, std::uint64_t count);
+  opencl::DeviceArray<float>& heights_buffer(std::uint64_t count);
   /// Where the scan lies there and the device computes in the host's memory; else none.
   [[nodiscard]] std::shared_ptr<Scratch> scratch() const;
 
@@ -257,7 +257,7 @@ class KeptGold {
   std::vector<opencl::DeviceArray<float>> pages_;
   std::map<TileAt, Place> tiles_;
   std::map<std::pair<int, std::size_t>, GoldFilter> filters_;
-  std::map<std::pair<int, std::size_t>, Across> across_;
+  std::map<std::pair<int, std::size_t>, AcrossWeights> across_;
   // Heights at half a pixel, tile by tile: all of them where memory allows, else a run that serves many
   // blocks.
   struct Run {
@@ -278,9 +278,9 @@ class KeptGold {
     std::optional<AlongZ> weights;
   };
   std::optional<Heights> heights_;
-  std::array<opencl::DeviceArray<float>, 2> buffers_;
-  std::optional<CommonGold> common_;  // until it is made
-  HostMemory common_bytes_;           // this device's part of it
+  opencl::DeviceArray<float> buffer_;  // gold's heights on kept columns, of boxes that are made together
+  std::optional<CommonGold> common_;   // until it is made
+  HostMemory common_bytes_;            // this device's part of it
   double column_seconds_ = 0, tile_seconds_ = 0, prepare_seconds_ = 0;
 };
 

@@ -59,47 +59,84 @@ __kernel void along_z(__global float* out, __global const float* in, __global co
 #error "VDVR_TAPS must be the taps of the filters across z"
 #endif
 // Named sums, not arrays, as above.
-#define FOR_1(M) M(0)
-#define FOR_3(M) M(0) M(1) M(2)
+#define FOR_2(M) M(0) M(1)
+#define FOR_3(M) FOR_2(M) M(2)
 #define FOR_4(M) FOR_3(M) M(3)
-#define FOR_5(M) FOR_4(M) M(4)
-#define FOR_7(M) FOR_5(M) M(5) M(6)
-#define BEGIN_SUM(i) VEC phase##i = (VEC)(0.0f);
-#define ADD_TAP(i) phase##i = fma((VEC)(w[(i)*VDVR_TAPS + t]), v, phase##i);
-#define PUT_PHASE(i)                                                                                  \
-  {                                                                                                   \
-    const int n = interval * phases + p + i - s.skipped;                                              \
-    if (p + i < phases && n >= 0 && n < s.outputs) STORE(phase##i, target + (size_t)n * s.out_along); \
-  }
+#define BEGIN_SUM(i) VEC sum##i = (VEC)(0.0f);
 
-// The nodes of an interval, which lies between the two middle ones of its inputs: the first of these itself,
-// and the others by weights[phase - 1][tap], in whole groups of SUMS phases, which share what they
-// read.
-#define ACROSS(SUMS, FOR_SUMS)                                                                              \
-  __kernel void across_##SUMS(__global float* out, __global const float* in, __global const float* weights, \
-                              VdvrAcross s) {                                                               \
-    const int z = (int)get_global_id(0) * VDVR_LANES, phases = s.phases;                                    \
-    const int other = (int)get_global_id(1), box = (int)get_global_id(2) / s.intervals,                     \
-              interval = (int)get_global_id(2) - box * s.intervals;                                         \
-    if (z >= s.z || other >= s.others || box >= s.boxes) return;                                            \
-    __global const float* from = in + s.in_first + (size_t)box * s.in_box +                                 \
-                                 (size_t)interval * s.step * s.in_along + (size_t)other * s.in_other + z;   \
-    __global float* target = out + s.out_first + (size_t)box * s.out_box + (size_t)other * s.out_other + z; \
-    const int node = interval * phases - s.skipped;                                                         \
-    if (node >= 0 && node < s.outputs)                                                                      \
-      STORE(LOAD(from + (VDVR_TAPS / 2 - 1) * s.in_along), target + (size_t)node * s.out_along);            \
-    for (int p = 1; p < phases; p += SUMS) {                                                                \
-      __global const float* w = weights + (p - 1) * VDVR_TAPS;                                              \
-      FOR_SUMS(BEGIN_SUM)                                                                                   \
-      for (int t = 0; t < VDVR_TAPS; ++t) {                                                                 \
-        const VEC v = LOAD(from + (size_t)t * s.in_along);                                                  \
-        FOR_SUMS(ADD_TAP)                                                                                   \
-      }                                                                                                     \
-      FOR_SUMS(PUT_PHASE)                                                                                   \
-    }                                                                                                       \
+// Kept columns of a row that lies between two of the kept ones, four at a time, which share the weights.
+#define BEGIN_COLUMN(i)     \
+  VEC sum##i = (VEC)(0.0f); \
+  __global const float* column##i = from + (size_t)min(first + x + i, s.kept_x - 1) * s.in_x;
+#define ADD_ROW(i) sum##i = fma(w, LOAD(column##i + row), sum##i);
+#define PUT_COLUMN(i) own[(x + i) * group] = sum##i;
+static inline ALWAYS_INLINE void along_y(__local VEC* own, int group, __global const float* in,
+                                         __global const float* weights, int y, int first, int columns,
+                                         VdvrAcross s) {
+  const int position = y + s.skipped_y, interval = position / s.phases_y,
+            phase = position - interval * s.phases_y;
+  __global const float* from = in + (size_t)interval * s.step_y * s.in_y;
+  if (phase == 0) {
+    from += (size_t)(VDVR_TAPS / 2 - 1) * s.in_y;
+    for (int x = 0; x < columns; ++x)
+      own[x * group] = LOAD(from + (size_t)min(first + x, s.kept_x - 1) * s.in_x);
+    return;
   }
-ACROSS(1, FOR_1)
-ACROSS(3, FOR_3)
-ACROSS(4, FOR_4)
-ACROSS(5, FOR_5)
-ACROSS(7, FOR_7)
+  __global const float* of_phase = weights + (phase - 1) * VDVR_TAPS;
+  for (int x = 0; x < columns; x += 4) {
+    FOR_4(BEGIN_COLUMN)
+    for (int t = 0; t < VDVR_TAPS; ++t) {
+      const VEC w = (VEC)(of_phase[t]);
+      const size_t row = (size_t)t * s.in_y;
+      FOR_4(ADD_ROW)
+    }
+    FOR_4(PUT_COLUMN)
+  }
+}
+
+// SUMS nodes at once, of PHASES phases in each interval, which share what they read.
+#define ADD_TAP(i) \
+  sum##i = fma((VEC)(w[i % phases_at_once * VDVR_TAPS + t]), from[(t + i / phases_at_once) * group], sum##i);
+#define PUT_NODE(i) put_node(target, sum##i, x + i / phases_at_once, end, p + i % phases_at_once, s);
+static inline ALWAYS_INLINE void put_node(__global float* target, VEC v, int interval, int end, int phase,
+                                          VdvrAcross s) {
+  const int n = interval * s.phases_x + phase - s.skipped_x;
+  if (interval < end && phase < s.phases_x && n >= 0 && n < s.outputs_x)
+    STORE(v, target + (size_t)n * s.out_x);
+}
+
+// A row of nodes of gold, or `chunk` of its intervals: first its kept columns, into local memory, where each
+// work-item has places of its own, then the nodes between these. An interval lies between the two middle ones
+// of its inputs, and its first node is the first of these itself.
+#define ACROSS(PHASES, SUMS, FOR_SUMS)                                                                       \
+  __kernel void across_##PHASES(__global float* out, __global const float* in,                               \
+                                __global const float* weights_x, __global const float* weights_y,            \
+                                VdvrAcross s, __local VEC* room) {                                           \
+    const int phases_at_once = PHASES;                                                                       \
+    const int z = (int)get_global_id(0) * VDVR_LANES, y = (int)get_global_id(1),                             \
+              box = (int)get_global_id(2) / s.chunks,                                                        \
+              first = ((int)get_global_id(2) - box * s.chunks) * s.chunk;                                    \
+    if (z >= s.z || y >= s.outputs_y || box >= s.boxes) return;                                              \
+    const int group = (int)(get_local_size(0) * get_local_size(1) * get_local_size(2));                      \
+    __local VEC* own = room + ((get_local_id(2) * get_local_size(1) + get_local_id(1)) * get_local_size(0) + \
+                               get_local_id(0));                                                             \
+    along_y(own, group, in + (size_t)box * s.in_box + z, weights_y, y, first * s.step_x, s.columns, s);      \
+    __global float* target = out + s.out_first + (size_t)box * s.out_box + (size_t)y * s.out_y + z;          \
+    const int end = min(first + s.chunk, s.intervals_x);                                                     \
+    for (int x = first; x < end; x += SUMS / PHASES) {                                                       \
+      const __local VEC* from = own + (x - first) * s.step_x * group;                                        \
+      for (int i = 0; i < SUMS / PHASES; ++i)                                                                \
+        put_node(target, from[(VDVR_TAPS / 2 - 1 + i * s.step_x) * group], x + i, end, 0, s);                \
+      for (int p = 1; p < s.phases_x; p += PHASES) {                                                         \
+        __global const float* w = weights_x + (p - 1) * VDVR_TAPS;                                           \
+        FOR_SUMS(BEGIN_SUM)                                                                                  \
+        for (int t = 0; t < VDVR_TAPS; ++t) {                                                                \
+          FOR_SUMS(ADD_TAP)                                                                                  \
+        }                                                                                                    \
+        FOR_SUMS(PUT_NODE)                                                                                   \
+      }                                                                                                      \
+    }                                                                                                        \
+  }
+ACROSS(1, 2, FOR_2)
+ACROSS(3, 3, FOR_3)
+ACROSS(4, 4, FOR_4)
