@@ -221,8 +221,7 @@ BOOST_AUTO_TEST_CASE(lattices_of_coarser_grids_share_nodes_and_other_grids_are_r
   BOOST_CHECK_THROW(static_cast<void>(kept.lattice(grid, 3)), std::logic_error);
 }
 
-// Blocks of a pass, bricks of a repair, in whatever order tiles were asked for: across z to the bit, and
-// along z too where heights are made of the rows alone.
+// Blocks of a pass, bricks of a repair, in whatever order tiles were asked for: to the bit.
 BOOST_AUTO_TEST_CASE(a_block_computed_alone_is_the_block_in_the_whole) {
   for (const std::int64_t rows : {9, 40}) {
     const ProjectionSet scan = noise_scan(11, rows, 40, 3);
@@ -242,18 +241,11 @@ BOOST_AUTO_TEST_CASE(a_block_computed_alone_is_the_block_in_the_whole) {
         const Nodes found = nodes_of(alone, lattice, part);
         BOOST_TEST(alone.tiles() <= together.tiles());
         std::int64_t different = 0;
-        double most = 0;
         for (std::int64_t y = part.first[1]; y < part.first[1] + part.nodes[1]; ++y)
           for (std::int64_t x = part.first[0]; x < part.first[0] + part.nodes[0]; ++x)
-            for (std::int64_t z = part.first[2]; z < part.first[2] + part.nodes[2]; ++z) {
-              const double d =
-                  static_cast<double>(found.at(x, y, z)) - static_cast<double>(in_whole.at(x, y, z));
-              different += d != 0;
-              most = std::max(most, std::abs(d));
-            }
-        // Filters along z begin their runs of terms elsewhere in another box.
-        if (rows <= 32 || lattice.phases[2] == 1 || part.first[2] == all.first[2]) BOOST_TEST(different == 0);
-        BOOST_TEST(most <= tolerance::bound(2 * together.errors(lattice).rounding));
+            for (std::int64_t z = part.first[2]; z < part.first[2] + part.nodes[2]; ++z)
+              different += found.at(x, y, z) != in_whole.at(x, y, z) ? 1 : 0;
+        BOOST_TEST(different == 0);
       }
     }
   }

@@ -146,8 +146,8 @@ GoldErrors KeptGold::parallel_errors(const GoldLattice& lattice, Fp64 fp64) {
   out.curved_interpolation = curved * (1 + z.sup) * chain.interpolation + curved_apart * filters;
 
   // Shared by all rows of a column; of each row by itself, which the product along z multiplies; of each
-  // height by itself, product and filter; of each node by itself, one more than taps in either filter across
-  // z.
+  // height by itself, product and filter, whose chains round no more than runs; of each node by itself, one
+  // more than taps in either filter across z.
   const double shared = chain.position, rows = gain_v * (1 + z.sup) * (chain.columns + chain.summation);
   const double between = !few_rows() ? product_error(2 * half_taps_[2] + 8, AlongZ::run) + 2 : 0.0;
   const double heights = unit_roundoff * S * z.norm *

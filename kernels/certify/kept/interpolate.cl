@@ -10,15 +10,19 @@
 #endif
 // --- along z ---
 
-// Eight columns share each vector of weights. Named sums, not arrays: compilers keep these in registers.
-#define FOR_COLUMNS(M) M(0) M(1) M(2) M(3) M(4) M(5) M(6) M(7)
+// Eight columns share each vector of weights, or four. Named sums, not arrays: compilers keep these in
+// registers.
+#define FOR_2(M) M(0) M(1)
+#define FOR_3(M) FOR_2(M) M(2)
+#define FOR_4(M) FOR_3(M) M(3)
+#define FOR_8(M) FOR_4(M) M(4) M(5) M(6) M(7)
+#define BEGIN_SUM(i) VEC sum##i = (VEC)(0.0f);
 // Columns beyond the last repeat it and are not stored.
-#define COLUMN(c)                                                                                     \
-  __global const float* column##c = in + p.in_first + (size_t)y * s.in_y +                            \
-                                    (size_t)min(x + c, p.columns_x - 1) * s.in_x + first_term[group]; \
-  VEC total##c = (VEC)(0.0f), rest##c = (VEC)(0.0f);
-#define CLEAR(c) VEC sum##c = (VEC)(0.0f);
+#define COLUMN(c)                                                          \
+  __global const float* column##c = in + p.in_first + (size_t)y * s.in_y + \
+                                    (size_t)min(x + c, p.columns_x - 1) * s.in_x + first_term[group];
 #define ADD(c) sum##c = fma((VEC)(column##c[j]), w, sum##c);
+#define BEGIN_TOTAL(c) VEC total##c = (VEC)(0.0f), rest##c = (VEC)(0.0f);
 // What adding a run to the others rounds off is summed beside them (Knuth's TwoSum: additions alone).
 #define TOTAL(c)                                          \
   {                                                       \
@@ -26,50 +30,68 @@
     rest##c += (total##c - (t - part)) + (sum##c - part); \
     total##c = t;                                         \
   }
-#define PUT(c) \
-  if (x + c < p.columns_x) STORE(total##c + rest##c, target + c * s.out_x);
+#define BEGIN_ODD(c) VEC odd##c = (VEC)(0.0f);
+#define ADD_ODD(c) odd##c = fma((VEC)(column##c[j + 1]), w_odd, odd##c);
+#define PUT_COLUMN(c, v) \
+  if (x + c < p.columns_x) STORE(v, target + c * s.out_x);
+#define PUT_TOTAL(c) PUT_COLUMN(c, total##c + rest##c)
+#define PUT_BOTH(c) PUT_COLUMN(c, sum##c + odd##c)
 
-// out[y][x][16 group + i] = sum_j weights[group][j][i] in[y][x][first_term[group] + j], part by part.
-__kernel void along_z(__global float* out, __global const float* in, __global const float* weights,
-                      __global const int* first_term, __global const VdvrColumns* parts, VdvrAlongZ s) {
-  const int z = (int)get_global_id(0) * VDVR_LANES, group = z / 16;
-  const int part = (int)get_global_id(2) / s.columns_y;
-  if (group >= s.groups || part >= s.parts) return;
-  const VdvrColumns p = parts[part];
-  const int x = (int)get_global_id(1) * 8, y = (int)get_global_id(2) - part * s.columns_y;
-  if (x >= p.columns_x || y >= p.columns_y) return;
-  __global const float* of_group = weights + (size_t)group * s.terms * 16 + z % 16;
-  FOR_COLUMNS(COLUMN)
-  for (int first = 0; first < s.terms; first += VDVR_RUN) {
-    const int last = min(first + VDVR_RUN, s.terms);
-    FOR_COLUMNS(CLEAR)
-    for (int j = first; j < last; ++j) {
-      const VEC w = LOAD(of_group + (size_t)j * 16);
-      FOR_COLUMNS(ADD)
-    }
-    FOR_COLUMNS(TOTAL)
+// out[y][x][16 group + i] = sum_j weights[group][j][i] in[y][x][first_term[group] + j], part by part, COLUMNS
+// columns a work-item.
+#define ALONG_Z(NAME, COLUMNS, SUMS)                                                                    \
+  __kernel void NAME(__global float* out, __global const float* in, __global const float* weights,      \
+                     __global const int* first_term, __global const VdvrColumns* parts, VdvrAlongZ s) { \
+    const int z = (int)get_global_id(0) * VDVR_LANES, group = z / 16;                                   \
+    const int part = (int)get_global_id(2) / s.columns_y;                                               \
+    if (group >= s.groups || part >= s.parts) return;                                                   \
+    const VdvrColumns p = parts[part];                                                                  \
+    const int x = (int)get_global_id(1) * COLUMNS, y = (int)get_global_id(2) - part * s.columns_y;      \
+    if (x >= p.columns_x || y >= p.columns_y) return;                                                   \
+    __global const float* of_group = weights + (size_t)group * s.terms * 16 + z % 16;                   \
+    __global float* target = out + p.out_first + (size_t)y * s.out_y + (size_t)x * s.out_x + z;         \
+    SUMS                                                                                                \
   }
-  __global float* target = out + p.out_first + (size_t)y * s.out_y + (size_t)x * s.out_x + z;
-  FOR_COLUMNS(PUT)
-}
+
+// Of many terms: in runs.
+#define IN_RUNS                                                                              \
+  FOR_8(COLUMN) FOR_8(BEGIN_TOTAL) for (int first = 0; first < s.terms; first += VDVR_RUN) { \
+    const int last = min(first + VDVR_RUN, s.terms);                                         \
+    FOR_8(BEGIN_SUM)                                                                         \
+    for (int j = first; j < last; ++j) {                                                     \
+      const VEC w = LOAD(of_group + (size_t)j * 16);                                         \
+      FOR_8(ADD)                                                                             \
+    }                                                                                        \
+    FOR_8(TOTAL)                                                                             \
+  }                                                                                          \
+  FOR_8(PUT_TOTAL)
+// Of a narrow band: every other one by itself, so that either chain has half of a filter's taps, wherever
+// these begin. Terms of weight 0 change nothing.
+#define IN_BAND                                                                                  \
+  FOR_4(COLUMN) FOR_4(BEGIN_SUM) FOR_4(BEGIN_ODD) int j = 0;                                     \
+  for (; j + 1 < s.terms; j += 2) {                                                              \
+    const VEC w = LOAD(of_group + (size_t)j * 16), w_odd = LOAD(of_group + (size_t)j * 16 + 16); \
+    FOR_4(ADD) FOR_4(ADD_ODD)                                                                    \
+  }                                                                                              \
+  if (j < s.terms) {                                                                             \
+    const VEC w = LOAD(of_group + (size_t)j * 16);                                               \
+    FOR_4(ADD)                                                                                   \
+  }                                                                                              \
+  FOR_4(PUT_BOTH)
+ALONG_Z(along_z, 8, IN_RUNS)
+ALONG_Z(along_z_in_band, 4, IN_BAND)
 
 // --- across z ---
 
 #ifndef VDVR_TAPS
 #error "VDVR_TAPS must be the taps of the filters across z"
 #endif
-// Named sums, not arrays, as above.
-#define FOR_2(M) M(0) M(1)
-#define FOR_3(M) FOR_2(M) M(2)
-#define FOR_4(M) FOR_3(M) M(3)
-#define BEGIN_SUM(i) VEC sum##i = (VEC)(0.0f);
-
 // Kept columns of a row that lies between two of the kept ones, four at a time, which share the weights.
 #define BEGIN_COLUMN(i)     \
   VEC sum##i = (VEC)(0.0f); \
   __global const float* column##i = from + (size_t)min(first + x + i, s.kept_x - 1) * s.in_x;
 #define ADD_ROW(i) sum##i = fma(w, LOAD(column##i + row), sum##i);
-#define PUT_COLUMN(i) own[(x + i) * group] = sum##i;
+#define KEEP_COLUMN(i) own[(x + i) * group] = sum##i;
 static inline ALWAYS_INLINE void along_y(__local VEC* own, int group, __global const float* in,
                                          __global const float* weights, int y, int first, int columns,
                                          VdvrAcross s) {
@@ -90,7 +112,7 @@ static inline ALWAYS_INLINE void along_y(__local VEC* own, int group, __global c
       const size_t row = (size_t)t * s.in_y;
       FOR_4(ADD_ROW)
     }
-    FOR_4(PUT_COLUMN)
+    FOR_4(KEEP_COLUMN)
   }
 }
 
