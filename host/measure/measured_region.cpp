@@ -108,7 +108,7 @@ MeasuredRegion::MeasuredRegion(const Grid& grid, const Certificate& certificate,
     if (!(low_[a] < high_[a]))
       throw InputError(fmt::format(
           "the region has no volume within what is certified, which along {} lies from {:.6g} to {:.6g}",
-          "xyz"[a], a == 2 ? covered_.z.first : grid.origin[a],
+          "xyz"[a], (a == 2 ? covered_.z.first : grid.origin[a]) + 0.0,  // not the zero with a sign
           a == 2 ? covered_.z.second
                  : grid.origin[a] + static_cast<double>(grid.cells[a]) * grid.spacing[a]));
   for (const RoundRegion& r : rounds_)

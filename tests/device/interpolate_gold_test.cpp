@@ -126,6 +126,7 @@ BOOST_AUTO_TEST_CASE(rows_of_many_chunks_are_rows_of_one) {
   compare({4, 1, 3, 2601}, {1, 1, 0, 1}, 16, 1);
   compare({1, 16, 0, 97}, {2, 1, 1, 2}, 16, 1);
   compare({1, 1, 0, 700}, {4, 1, 1, 3}, 16, 1);
+  compare({1, 300, 0, 7}, {1, 1, 0, 3}, 16, 1);  // groups become smaller
 }
 
 BOOST_AUTO_TEST_CASE(filters_of_different_lengths_are_refused) {

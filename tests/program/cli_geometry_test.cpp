@@ -3,6 +3,7 @@
 #include <boost/test/unit_test.hpp>
 
 #include <filesystem>
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -106,6 +107,22 @@ BOOST_AUTO_TEST_CASE(info_says_distances_angles_and_what_was_assumed) {
   // Half of 16 pixels of 0.4, at 150.
   const double half_fan = std::atan(8 * 0.4 / 150) * 180 / pi;
   BOOST_TEST(std::abs(cone["half_fan_deg"].get<double>() - half_fan) <= same * half_fan);
+}
+
+// Of cone beam `build` takes what all views see, `reconstruct` a box around it.
+BOOST_AUTO_TEST_CASE(info_shows_the_grid_of_build_and_that_of_reconstruct) {
+  const std::string folder = circular_scan();
+  const Ended r = run({"info", folder}), planned = run({"plan", folder, "--epsilon", "50%", "--json"});
+  BOOST_REQUIRE_MESSAGE(r.code == 0 && planned.code == 0, r.err << planned.err);
+  const json said = json::parse(run({"info", folder, "--json"}).out), plan = json::parse(planned.out);
+  BOOST_TEST(said["certified_grid"] == plan["grid"]);
+  BOOST_TEST(said["certified_grid"] != said["default_grid"]);
+  const auto cells = [](const json& grid) {
+    const json& n = grid["cells"];
+    return fmt::format("{} x {} x {} cells", n[0].get<int>(), n[1].get<int>(), n[2].get<int>());
+  };
+  BOOST_TEST(has(r.out, "grid           " + cells(said["certified_grid"])));
+  BOOST_TEST(has(r.out, "reconstruct  " + cells(said["default_grid"])));
 }
 
 BOOST_AUTO_TEST_CASE(converted_geometry_is_read_back_with_the_stack_that_was_printed) {

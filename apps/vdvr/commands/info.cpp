@@ -3,14 +3,16 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/cone.hpp"
 #include "apps/vdvr/inputs.hpp"
 #include "apps/vdvr/noise_words.hpp"
 #include "apps/vdvr/output.hpp"
-#include "vdvr/expert/extend_rows.hpp"
 #include "vdvr/error.hpp"
+#include "vdvr/expert/certify.hpp"
+#include "vdvr/expert/extend_rows.hpp"
 #include "vdvr/vdvr_file.hpp"
 
 namespace vdvr::cli {
@@ -74,12 +76,24 @@ int volume_info(const std::filesystem::path& path, const Arguments& args, const 
   return 0;
 }
 
+/// Of `build`, which certifies what the scan covers; none where that is nothing. `reconstruct` fills another.
+std::optional<Grid> certified_grid_of(const ProjectionSet& scan) {
+  try {
+    return grid_to_certify(scan, {});
+  } catch (const InputError&) {
+    return {};
+  }
+}
+
 int scan_info(const std::filesystem::path& path, const Arguments& args, const CommonOptions& common) {
   ProgressLine progress(args.who(), common.quiet);
   Understood understood;
   const ProjectionSet scan = load_scan(path, args, {}, progress.callback(), &understood);
   const NoiseFound noise = noise_of_scan(path, args, {}, scan);
   const Grid grid = make_grid(scan, {});
+  const std::optional<Grid> certified = certified_grid_of(scan);
+  const bool differ = certified && (certified->cells != grid.cells || certified->origin != grid.origin ||
+                                    certified->spacing != grid.spacing);
   // Where nobody states a roll, rows that say one are worth a word.
   std::optional<RollEstimate> roll;
   if (scan.geometry.axis_roll_deg == 0 && !understood.stated.axis_roll_deg) roll = find_roll(scan);
@@ -94,6 +108,7 @@ int scan_info(const std::filesystem::path& path, const Arguments& args, const Co
                {"report", report_json(scan.report)},
                {"range", {*range.first, *range.second}},
                {"default_grid", grid_json(grid)}};
+  if (certified) json["certified_grid"] = grid_json(*certified);
   if (scan.cone) json["cone"] = cone_json(scan);
   if (roll) json["roll_found"] = {{"degrees", roll->roll_deg}, {"uncertainty", roll->uncertainty_deg}};
   json["noise"] = noise_json(noise);
@@ -102,7 +117,10 @@ int scan_info(const std::filesystem::path& path, const Arguments& args, const Co
     if (roll) fmt::print("  axis roll    {}\n", words_of(*roll, 0));
     print_noise(noise);
     fmt::print("  integrals    {:.6g} to {:.6g}\n", *range.first, *range.second);
-    print_grid(grid);
+    print_grid(differ ? *certified : grid);
+    if (differ)
+      fmt::print("  reconstruct  {} x {} x {} cells, first sample at {}\n", grid.cells[0], grid.cells[1],
+                 grid.cells[2], vec_text(grid.origin));
   });
   return 0;
 }

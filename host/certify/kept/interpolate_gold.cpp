@@ -132,10 +132,12 @@ void fill_across(opencl::State& state, const AcrossWeights& x, const AcrossWeigh
   opencl::Range range =
       opencl::in_groups(state.info, {count(shape.z / lanes), count(shape.outputs_y), count(shape.boxes)},
                         {lanes > 1 ? 1U : 16U, 1, 1});
-  // Of a row as much as finds room; on a CPU the whole row does.
-  const std::uint64_t a_column = 4 * count(lanes) * range.local[0] * range.local[1] * range.local[2];
+  // Of a row as much as finds room, at least an interval; on a CPU the whole row does.
+  const auto a_column = [&] { return 4 * count(lanes) * range.local[0] * range.local[1] * range.local[2]; };
+  while (count(columns(1)) * a_column() > room && a_column() > 4 * count(lanes))
+    *std::ranges::max_element(range.local) /= 2;
   std::int64_t most = 1;
-  while (most < shape.intervals_x && count(columns(most + 1)) * a_column <= room) ++most;
+  while (most < shape.intervals_x && count(columns(most + 1)) * a_column() <= room) ++most;
   const std::int64_t chunks = (shape.intervals_x + most - 1) / most,
                      chunk = (shape.intervals_x + chunks - 1) / chunks;
   shape.chunks = to_int(chunks);
@@ -146,7 +148,7 @@ void fill_across(opencl::State& state, const AcrossWeights& x, const AcrossWeigh
       state, "certify/kept/interpolate", fmt::format("across_{}", phases_together(x.phases)),
       defines(lanes, x.taps));
   kernel(range, out.buffer(), in.buffer(), x.values.buffer(), y.values.buffer(), shape,
-         cl::Local(count(shape.columns) * a_column));
+         cl::Local(count(shape.columns) * a_column()));
 }
 
 }  // namespace vdvr

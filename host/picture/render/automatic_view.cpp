@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <unordered_map>
 #include <utility>
 
@@ -50,7 +51,7 @@ std::size_t quantile_bin(const Histogram& histogram, double q) {
   return bin;
 }
 
-/// Of the samples for which `counts` is true.
+/// Of the samples for which `counts` is true, to a hundredth of a cell: a slice's place is read.
 template <class Counts>
 Vec3 centroid_of(const Grid& grid, const std::vector<float>& base, Counts&& counts) {
   const Index3 n = grid.samples();
@@ -66,7 +67,12 @@ Vec3 centroid_of(const Grid& grid, const std::vector<float>& base, Counts&& coun
         count += 1;
       }
   if (count == 0) return grid.position({n[0] / 2, n[1] / 2, n[2] / 2});
-  return {sum[0] / count, sum[1] / count, sum[2] / count};
+  Vec3 out{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double cells = (sum[a] / count - grid.origin[a]) / grid.spacing[a];
+    out[a] = grid.origin[a] + std::round(100 * cells) / 100 * grid.spacing[a];
+  }
+  return out;
 }
 
 // --- masks and label maps ---
