@@ -5,6 +5,7 @@
 
 #include <cstring>
 #include <nlohmann/json.hpp>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -220,6 +221,17 @@ BOOST_AUTO_TEST_CASE(what_has_no_certificate_by_ray_is_refused) {
                 "--show class");
   check_refused({"render", small_volume(), "--mode", "iso", "--certify", "--iso", "0.3,0.5", "-o", out},
                 "one surface");
+}
+
+BOOST_AUTO_TEST_CASE(a_least_tolerance_of_pictures_that_is_out_of_reach_is_named) {
+  const std::string views = at("few.json");
+  write(views, R"({"size": [12, 12], "views": [{"azimuth": 10}]})");
+  const Ended r = run({"build", small_scan(), "--picture-tolerance", "40", "--views", views, "--gold", "2",
+                       "--picture-finest", "0.001%", "-o", at("finest.vdvr")});
+  BOOST_TEST(r.code == 1);
+  BOOST_TEST(r.err.find("is out of reach") != std::string::npos, r.err);
+  BOOST_TEST(r.err.find("--picture-finest") != std::string::npos, r.err);
+  BOOST_TEST(!std::ifstream(at("finest.vdvr")).good());
 }
 
 BOOST_AUTO_TEST_CASE(a_build_is_refined_until_its_pictures_are_certain) {

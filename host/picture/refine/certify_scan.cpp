@@ -26,7 +26,11 @@ void plan_for_pictures(Device& device, const ProjectionSet& scan, PlannedScan& p
   options.plan.everywhere = planned.asked.tolerance;
   // Pictures are of the whole grid, so a part of the scan does not do.
   options.plan.estimate = false;
-  planned.plan = make_plan(device, scan, Tolerance{wanted.finest, {}}, options, progress);
+  try {
+    planned.plan = make_plan(device, scan, Tolerance{wanted.finest, {}}, options, progress);
+  } catch (const ToleranceError& e) {
+    throw ToleranceError(fmt::format("{}; with pictures it is `picture_finest` that is too small", e.what()));
+  }
   static_cast<void>(planned.everywhere_abs());
   planned.pictures = std::make_shared<PictureRefinement>(wanted.views, scan, planned.plan.field,
                                                          planned.refinement_options(), progress);
