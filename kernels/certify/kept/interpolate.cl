@@ -54,30 +54,38 @@
   }
 
 // Of many terms: in runs.
-#define IN_RUNS                                                                              \
-  FOR_8(COLUMN) FOR_8(BEGIN_TOTAL) for (int first = 0; first < s.terms; first += VDVR_RUN) { \
-    const int last = min(first + VDVR_RUN, s.terms);                                         \
-    FOR_8(BEGIN_SUM)                                                                         \
-    for (int j = first; j < last; ++j) {                                                     \
-      const VEC w = LOAD(of_group + (size_t)j * 16);                                         \
-      FOR_8(ADD)                                                                             \
-    }                                                                                        \
-    FOR_8(TOTAL)                                                                             \
-  }                                                                                          \
-  FOR_8(PUT_TOTAL)
+#define IN_RUNS                                             \
+  FOR_8(COLUMN);                                            \
+  FOR_8(BEGIN_TOTAL);                                       \
+  for (int first = 0; first < s.terms; first += VDVR_RUN) { \
+    const int last = min(first + VDVR_RUN, s.terms);        \
+    FOR_8(BEGIN_SUM);                                       \
+    for (int j = first; j < last; ++j) {                    \
+      const VEC w = LOAD(of_group + (size_t)j * 16);        \
+      FOR_8(ADD);                                           \
+    }                                                       \
+    FOR_8(TOTAL);                                           \
+  }                                                         \
+  FOR_8(PUT_TOTAL);
+
 // Of a narrow band: every other one by itself, so that either chain has half of a filter's taps, wherever
 // these begin. Terms of weight 0 change nothing.
 #define IN_BAND                                                                                  \
-  FOR_4(COLUMN) FOR_4(BEGIN_SUM) FOR_4(BEGIN_ODD) int j = 0;                                     \
+  FOR_4(COLUMN);                                                                                 \
+  FOR_4(BEGIN_SUM);                                                                              \
+  FOR_4(BEGIN_ODD);                                                                              \
+  int j = 0;                                                                                     \
   for (; j + 1 < s.terms; j += 2) {                                                              \
     const VEC w = LOAD(of_group + (size_t)j * 16), w_odd = LOAD(of_group + (size_t)j * 16 + 16); \
-    FOR_4(ADD) FOR_4(ADD_ODD)                                                                    \
+    FOR_4(ADD);                                                                                  \
+    FOR_4(ADD_ODD);                                                                              \
   }                                                                                              \
   if (j < s.terms) {                                                                             \
     const VEC w = LOAD(of_group + (size_t)j * 16);                                               \
-    FOR_4(ADD)                                                                                   \
+    FOR_4(ADD);                                                                                  \
   }                                                                                              \
-  FOR_4(PUT_BOTH)
+  FOR_4(PUT_BOTH);
+
 ALONG_Z(along_z, 8, IN_RUNS)
 ALONG_Z(along_z_in_band, 4, IN_BAND)
 
