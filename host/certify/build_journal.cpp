@@ -69,7 +69,7 @@ JournalHead journal_head(const std::vector<Crew::Kind>& devices, const Projectio
   const ParallelGeometry& g = scan.geometry;
   const Index3 blocks = stream.block_bricks();
   JournalHead head{
-      {"record format", "11"},
+      {"record format", "12"},
       {"version", VDVR_VERSION},
       {"device", joined(devices, &DeviceInfo::name)},
       {"driver", joined(devices, &DeviceInfo::driver)},

@@ -44,12 +44,15 @@ static inline __attribute__((always_inline)) float8 taps(float g) {
   return TAPS(float8, g, s, SAME);
 }
 
-// Of two places, each of which fills one half of `g`.
-#define TWICE(taps) (float16)(taps, taps)
-static inline __attribute__((always_inline)) float16 taps_of_two(float16 g) {
-  const float16 s = g * g;
-  return TAPS(float16, g, s, TWICE);
-}
+// What the four taps below four places have of even and of odd powers.
+#define FOUR_OF(kind, pick) \
+  ((float4)(TAP(pick, kind, A), TAP(pick, kind, B), TAP(pick, kind, C), TAP(pick, kind, D)))
+#define FOUR_TIMES(four) (float16)(four, four, four, four)
+#define HALF_TAPS(kind, s)                                                \
+  VDVR_TAPS_FUSED_HORNER(float16, s, FOUR_TIMES(FOUR_OF(kind, FIRST_OF)), \
+                         FOUR_TIMES(FOUR_OF(kind, SECOND_OF)), FOUR_TIMES(FOUR_OF(kind, THIRD_OF)))
+#define EVEN_TAPS(s) HALF_TAPS(EVEN, s)
+#define ODD_TAPS(s) HALF_TAPS(ODD, s)
 
 // `left` and `right`: four columns each, weighed, in a vector type T; column(j) has the j-th of eight.
 #define WEIGH_COLUMNS(T, weight, column)                                   \

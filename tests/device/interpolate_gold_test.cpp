@@ -136,7 +136,8 @@ BOOST_AUTO_TEST_CASE(filters_of_different_lengths_are_refused) {
   BOOST_CHECK_THROW(fill_across(state, sixteen, twelve, any, any, {}), std::logic_error);
 }
 
-// With all rows in compensated runs; with a band of 16 in two chains, wherever it begins in its group.
+// With all rows in compensated runs; with a band in two chains or in four, wherever it begins in its group,
+// within what its runs would be charged.
 BOOST_AUTO_TEST_CASE(heights_are_products_with_all_inputs_or_a_band) {
   opencl::State& state = support::device().state();
   struct Case {
@@ -144,7 +145,8 @@ BOOST_AUTO_TEST_CASE(heights_are_products_with_all_inputs_or_a_band) {
   };
   for (const auto& [outputs, inputs, band, phases] :
        {Case{40, 17, 17, 1}, Case{33, 200, 200, 1}, Case{35, 25, 16, 4}, Case{67, 25, 16, 8},
-        Case{133, 82, 16, 2}, Case{20, 35, 16, 1}, Case{1, 1, 1, 1}}) {
+        Case{133, 82, 16, 2}, Case{20, 35, 16, 1}, Case{1, 1, 1, 1}, Case{35, 29, 20, 4},
+        Case{133, 90, 24, 2}, Case{67, 38, 28, 8}, Case{21, 53, 32, 1}}) {
     const bool narrow = band < inputs;
     std::vector<double> matrix(at(outputs * inputs), 0.0);
     const auto weights = random_floats(matrix.size(), 4);
@@ -152,7 +154,8 @@ BOOST_AUTO_TEST_CASE(heights_are_products_with_all_inputs_or_a_band) {
       for (std::int64_t j = 0; j < band; ++j)
         matrix[at(i * inputs + i / phases * (narrow ? 1 : 0) + j)] =
             static_cast<double>(weights[at(i * inputs + j)]);
-    const HeightWeights of_heights = height_weights(matrix, outputs, inputs, narrow);
+    const int chains = narrow ? AlongZ::chains_of(band) : 0;
+    const HeightWeights of_heights = height_weights(matrix, outputs, inputs, chains);
     const std::int64_t columns = 11, rows = 3, stride = (inputs + 15) / 16 * 16,
                        padded = 16 * of_heights.groups();
     const std::vector<float> kept = random_floats(at(columns * rows * stride), 5);
@@ -166,8 +169,12 @@ BOOST_AUTO_TEST_CASE(heights_are_products_with_all_inputs_or_a_band) {
     const std::vector<VdvrColumns> parts{{0, 0, to_int(columns), to_int(rows)}};
     AlongZ(state, of_heights)(state, in, out, parts, shape);
     const std::vector<float> found = out.to_host();
-    const double rounding =
-        unit_roundoff * (narrow ? static_cast<double>(band) / 2 + 3 : product_error(inputs, AlongZ::run) + 2);
+    // A chain, what the chains add up to, and the weight.
+    const double charged = product_error(narrow ? band + 8 : inputs, AlongZ::run) + 2,
+                 roundings =
+                     narrow ? static_cast<double>((band + chains - 1) / chains + chains / 2 + 1) : charged;
+    BOOST_TEST(roundings <= charged);
+    const double rounding = unit_roundoff * roundings;
     std::int64_t outside = 0;
     for (std::int64_t c = 0; c < columns * rows; ++c)
       for (std::int64_t i = 0; i < outputs; ++i) {

@@ -69,7 +69,7 @@ void KeptGold::begin_run(std::int64_t low, std::int64_t heights) {
   run.low = low;
   run.count = heights;
   const HeightWeights weights = height_weights(rows_of(static_cast<double>(run.low), 1.0, run.count),
-                                               run.count, scan_.geometry.rows, false);
+                                               run.count, scan_.geometry.rows, 0);
   run.stride = column_stride(run.count);
   const std::uint64_t a_tile = 4 * count(side * side * run.stride),
                       most = std::min(state_.info.is_cpu ? most_run_page : most_run_page_of_card,
@@ -133,7 +133,7 @@ void KeptGold::resample_heights(const GoldLattice& lattice, const GoldBox& box) 
   if (few_rows()) {
     const double step = static_cast<double>(h.step) / h.phases;
     weights = height_weights(rows_of(static_cast<double>(h.first) * step, step, h.nodes), h.nodes,
-                             scan_.geometry.rows, false);
+                             scan_.geometry.rows, 0);
   } else {
     const GoldFilter& f = filter_of(h.phases, 2);
     std::vector<double> between(at(h.nodes * s.count), 0.0);
@@ -150,7 +150,7 @@ void KeptGold::resample_heights(const GoldLattice& lattice, const GoldBox& box) 
         for (std::int64_t t = 0; t < f.taps; ++t)
           put(t, static_cast<double>(f.weights[at(phase * f.taps + t)]));
     }
-    weights = height_weights(between, h.nodes, s.count, f.taps <= AlongZ::most_in_band);
+    weights = height_weights(between, h.nodes, s.count, AlongZ::chains_of(f.taps));
   }
   h.weights.emplace(state_, weights);
   h.padded = 16 * weights.groups();

@@ -33,12 +33,30 @@ opencl::Defines defines(int lanes, int taps) {
 int phases_together(int phases) { return phases <= 2 ? 1 : phases == 4 ? 3 : 4; }
 int intervals_together(int phases) { return phases <= 2 ? 2 : 1; }
 
-// Eight columns have as many sums, and sixteen beside them: of vectors that take two registers each they do
-// not fit into those of a CPU with 8 lanes. Four of a band have eight.
-int lanes_along_z(opencl::State& state, bool in_band) {
+// Of which kernel a work-item does so many columns.
+struct AlongKernel {
+  const char* name = "along_z";
+  int columns = 8;
+  std::uint32_t together = 4;  // work-items of a work-group, with columns beside one another
+};
+AlongKernel along_kernel(int chains) {
+  switch (chains) {
+    case 2:
+      return {"along_z_in_two", 4, 8};
+    case 4:
+      return {"along_z_in_four", 3, 4};
+    default:
+      return {};
+  }
+}
+
+// Sums of vectors that take two registers each do not fit into those of a CPU with 8 lanes: those of runs,
+// with two sums beside each, and of four chains. Two chains of four columns do.
+int lanes_along_z(opencl::State& state, int chains) {
   const int tuned = column_tuning(state.info).lanes;
-  return !in_band && tuned == 16 && state.device.getInfo<CL_DEVICE_NATIVE_VECTOR_WIDTH_FLOAT>() <= 8 ? 8
-                                                                                                     : tuned;
+  return chains != 2 && tuned == 16 && state.device.getInfo<CL_DEVICE_NATIVE_VECTOR_WIDTH_FLOAT>() <= 8
+             ? 8
+             : tuned;
 }
 
 // Whole groups of the phases that a work-item makes together.
@@ -53,7 +71,7 @@ std::vector<float> padded(int phases, int taps, std::span<const float> weights) 
 }  // namespace
 
 HeightWeights height_weights(std::span<const double> matrix, std::int64_t outputs, std::int64_t inputs,
-                             bool in_band) {
+                             int chains) {
   if (inputs < 1) throw std::logic_error("height_weights: no input");
   HeightWeights out;
   const std::int64_t groups = (outputs + lanes_of_group - 1) / lanes_of_group;
@@ -64,9 +82,9 @@ HeightWeights height_weights(std::span<const double> matrix, std::int64_t output
         low[at(i / lanes_of_group)] = std::min(low[at(i / lanes_of_group)], j);
         high[at(i / lanes_of_group)] = std::max(high[at(i / lanes_of_group)], j);
       }
-  const std::int64_t run = in_band ? 1 : AlongZ::run;
+  const std::int64_t run = chains > 0 ? 1 : AlongZ::run;
   const auto in_runs = [run](std::int64_t n) { return (n + run - 1) / run * run; };
-  out.in_band = in_band;
+  out.chains = chains;
   out.terms = run;
   for (std::int64_t group = 0; group < groups; ++group)
     out.terms = std::max(out.terms, in_runs(high[at(group)] + 1) - low[at(group)] / run * run);
@@ -86,7 +104,7 @@ HeightWeights height_weights(std::span<const double> matrix, std::int64_t output
 AlongZ::AlongZ(opencl::State& state, const HeightWeights& weights)
     : weights_(opencl::copied<float>(state, weights.weights, "weights of heights")),
       first_(opencl::copied<cl_int>(state, weights.first, "first heights")),
-      in_band_(weights.in_band),
+      chains_(weights.chains),
       terms_(weights.terms),
       groups_(weights.groups()) {}
 
@@ -103,14 +121,15 @@ void AlongZ::operator()(opencl::State& state, const opencl::DeviceArray<float>& 
     shape.columns_y = std::max(shape.columns_y, p.columns_y);
   }
   const auto on_device = opencl::copied<VdvrColumns>(state, parts, "columns to interpolate");
-  const int lanes = lanes_along_z(state, in_band_), columns = in_band_ ? 4 : 8;
+  const int lanes = lanes_along_z(state, chains_);
+  const auto [name, columns, together] = along_kernel(chains_);
   opencl::Kernel<cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, cl::Buffer, VdvrAlongZ> kernel(
-      state, "certify/kept/interpolate", in_band_ ? "along_z_in_band" : "along_z", defines(lanes, 2));
+      state, "certify/kept/interpolate", name, defines(lanes, 2));
   kernel(opencl::in_groups(
              state.info,
              {count(groups_ * lanes_of_group / lanes), count((shape.columns_x + columns - 1) / columns),
               count(std::int64_t{shape.columns_y} * shape.parts)},
-             {1, in_band_ ? 8U : 4U, 1}),
+             {1, together, 1}),
          out.buffer(), in.buffer(), weights_.buffer(), first_.buffer(), on_device.buffer(), shape);
 }
 

@@ -12,7 +12,7 @@ namespace vdvr {
 
 /// Heights out of heights: out[16 group + i] = sum_j weights[group][j][i] in[first[group] + j], j < terms.
 struct HeightWeights {
-  bool in_band = false;
+  int chains = 0;  ///< AlongZ::chains_of
   std::int64_t terms = 0;
   std::vector<float> weights;  ///< [group][terms][16]
   std::vector<cl_int> first;   ///< [group]
@@ -21,11 +21,11 @@ struct HeightWeights {
 };
 
 /// Of float matrix[output][input] whose entries outside a band are 0: groups of 16 outputs, each over as many
-/// inputs as the widest has. Of many inputs: in whole runs of AlongZ that begin at a multiple of one; reads
-/// up to a run beyond the last input. `in_band`, of few: in two chains, of every other input. An output is
-/// rounded in the same way whatever outputs share its group. Throws std::logic_error where there is no input.
+/// inputs as the widest has. Without chains, of many inputs: in whole runs of AlongZ that begin at a multiple
+/// of one; reads up to a run beyond the last input. An output is rounded in the same way whatever outputs
+/// share its group. Throws std::logic_error where there is no input.
 HeightWeights height_weights(std::span<const double> matrix, std::int64_t outputs, std::int64_t inputs,
-                             bool in_band);
+                             int chains);
 
 /// The same on the device.
 class AlongZ {
@@ -33,19 +33,20 @@ class AlongZ {
   AlongZ(opencl::State& state, const HeightWeights& weights);
   /// Of these rectangles of columns, by one launch; of `shape` only the distances between columns are read.
   /// Enqueues. Cost: columns * groups * 16 * terms multiply-adds; error: that of a product in runs of `run`
-  /// terms, or of half as many terms as a band has, and one more.
+  /// terms. In two chains or in four each has its share of a band, and one or two roundings more.
   void operator()(opencl::State& state, const opencl::DeviceArray<float>& in,
                   const opencl::DeviceArray<float>& out, std::span<const VdvrColumns> parts,
                   VdvrAlongZ shape) const;
 
   static constexpr int run = 8;
-  /// Taps of a band whose two chains, and their sum, round no more than its runs would.
-  static constexpr int most_in_band = 18;
+  /// Into how many chains a band of so many taps is summed, that these and their sum round no more than runs
+  /// would; 0: in runs.
+  static constexpr int chains_of(std::int64_t taps) { return taps <= 18 ? 2 : taps <= 32 ? 4 : 0; }
 
  private:
   opencl::DeviceArray<float> weights_;
   opencl::DeviceArray<cl_int> first_;
-  bool in_band_ = false;
+  int chains_ = 0;
   std::int64_t terms_ = 0, groups_ = 0;
 };
 

@@ -24,7 +24,7 @@
 // cost more from registers.
 typedef struct {
   float16 strip[CHUNKS];
-  float g[RUN];
+  float g[RUN] __attribute__((aligned(64)));
   int row[RUN];
 } Seen;
 
@@ -66,10 +66,18 @@ static ALWAYS_INLINE void place_heights(Seen* seen, double lowest, double slope,
   }
 }
 
+// Where a column of nodes lies in a view: the lowest of its heights and the slope of these, in rows beyond
+// row `whole`, and from which rows and columns its strip is made.
+typedef struct {
+  double lowest, slope;
+  float8 weight;
+  size_t first;
+  int whole, chunks, last;
+} Place;
+
 // dx, dy, dz: nodes from the tile's middle to the lowest of so many heights.
-static ALWAYS_INLINE void look_at(Seen* seen, __global const float* plane, __global const ConeView* v,
-                                  double dx, double dy, double dz, int heights, int column_stride,
-                                  int last_column, int last_row) {
+static ALWAYS_INLINE Place place_in(__global const ConeView* v, double dx, double dy, double dz, int heights,
+                                    VdvrConeNodes s) {
   const double inverse = 1.0f / (fma(v->step_lambda[0], dx, v->step_lambda[1] * dy) + v->lambda),
                u = fma(fma(v->step_u[0], dx, v->step_u[1] * dy), inverse, v->part_u),
                slope = v->step_v[2] * inverse,
@@ -77,37 +85,53 @@ static ALWAYS_INLINE void look_at(Seen* seen, __global const float* plane, __glo
                    fma(fma(v->step_v[2], dz, fma(v->step_v[0], dx, v->step_v[1] * dy)), inverse, v->part_v),
                highest = fma(slope, (double)(heights - 1), lowest);
   const int whole_u = floor_of(u), whole_v = (int)v->whole_v - 3,
-            column = clamp((int)v->whole_u + whole_u - 3, 0, last_column);
+            column = clamp((int)v->whole_u + whole_u - 3, 0, s.last_column);
   // A row more on either side: floats may round to it.
-  const int low = clamp(whole_v + floor_of(min(lowest, highest)) - 1, 0, last_row) / 16 * 16,
-            high = clamp(whole_v + floor_of(max(lowest, highest)) + 1, 0, last_row) + VDVR_CONE_HEIGHTS,
+  const int low = clamp(whole_v + floor_of(min(lowest, highest)) - 1, 0, s.last_row) / 16 * 16,
+            high = clamp(whole_v + floor_of(max(lowest, highest)) + 1, 0, s.last_row) + VDVR_CONE_HEIGHTS,
             chunks = min((high - low + 15) / 16, CHUNKS);
-  make_strip(seen->strip, plane + (size_t)column * column_stride + low, column_stride, chunks,
-             (float)(inverse * inverse) * taps((float)(u - (double)whole_u - 0.5f)));
-  place_heights(seen, lowest - 0.5f, slope, whole_v - low,
-                min(chunks * 16 - VDVR_CONE_HEIGHTS, last_row - low));
+  const Place place = {lowest - 0.5f,
+                       slope,
+                       (float)(inverse * inverse) * taps((float)(u - (double)whole_u - 0.5f)),
+                       (size_t)column * s.column_stride + low,
+                       whole_v - low,
+                       chunks,
+                       min(chunks * 16 - VDVR_CONE_HEIGHTS, s.last_row - low)};
+  return place;
 }
 
-#define FOR_PAIRS(DO) DO(0, 0, 1) DO(1, 2, 3) DO(2, 4, 5) DO(3, 6, 7)
-#define CLEAR(n, i, j) float16 sum##n = (float16)(0.0f);
-#define ADD(n, i, j)                                                                      \
-  {                                                                                       \
-    const float16 place = (float16)((float8)(g[i]), (float8)(g[j])),                      \
-                  rows = (float16)(vload8(0, strip + row[i]), vload8(0, strip + row[j])); \
-    sum##n = fma(taps_of_two(place), rows, sum##n);                                       \
+typedef float4 __attribute__((aligned(4))) Loose;
+#define BELOW(i) *(const Loose*)(strip + row[i])
+#define ABOVE(i) (*(const Loose*)(strip + row[i] + 4)).wzyx
+// What views together see at heights i, i + 4, j and j + 4 of eight: of each height four sums, of two taps
+// equally far from its place. Taps on either side of a place take the same polynomials, and four heights
+// share a vector of each side, the upper one from the outside in. Heights are picked so that processors
+// spread places within halves of a vector. EACH has the four places four times each.
+#define SUM_FOUR(NAME, i, j, EACH)                                                                           \
+  static ALWAYS_INLINE float16 NAME(const Seen* seen, int views, int first) {                                \
+    float16 below = (float16)(0.0f), above = (float16)(0.0f);                                                \
+    for (int v = 0; v < views; ++v) {                                                                        \
+      const float* strip = (const float*)seen[v].strip;                                                      \
+      const int* row = seen[v].row + first;                                                                  \
+      const float8 places = *(const float8*)(seen[v].g + first);                                             \
+      const float16 place = places.EACH, square = place * place, even = EVEN_TAPS(square),                   \
+                    odd = ODD_TAPS(square);                                                                  \
+      below = fma(fma(place, odd, even), (float16)(BELOW(i), BELOW(i + 4), BELOW(j), BELOW(j + 4)), below);  \
+      above = fma(fma(-place, odd, even), (float16)(ABOVE(i), ABOVE(i + 4), ABOVE(j), ABOVE(j + 4)), above); \
+    }                                                                                                        \
+    return below + above.s32107654ba98fedc;                                                                  \
   }
-#define PUT(n, i, j)          \
-  to[i] += sum_of(sum##n.lo); \
-  to[j] += sum_of(sum##n.hi);
-// Adds eight heights of some views, two of them in a vector.
+SUM_FOUR(first_and_second, 0, 1, s0000444411115555)
+SUM_FOUR(third_and_fourth, 2, 3, s2222666633337777)
+
+// Of two vectors the lower two or the upper two of each half, in turns.
+#define LOWER(a, b) ((float8)((a).s0, (b).s0, (a).s1, (b).s1, (a).s4, (b).s4, (a).s5, (b).s5))
+#define UPPER(a, b) ((float8)((a).s2, (b).s2, (a).s3, (b).s3, (a).s6, (b).s6, (a).s7, (b).s7))
+// Adds eight heights of some views: the order is that of sum_of.
 static ALWAYS_INLINE void add_heights(float* to, const Seen* seen, int views, int first) {
-  FOR_PAIRS(CLEAR)
-  for (int k = 0; k < views; ++k) {
-    const float *strip = (const float*)seen[k].strip, *g = seen[k].g + first;
-    const int* row = seen[k].row + first;
-    FOR_PAIRS(ADD)
-  }
-  FOR_PAIRS(PUT)
+  const float16 s = first_and_second(seen, views, first), t = third_and_fourth(seen, views, first);
+  const float8 low = LOWER(s.lo, t.lo) + UPPER(s.lo, t.lo), high = LOWER(s.hi, t.hi) + UPPER(s.hi, t.hi);
+  vstore8(vload8(0, to) + (LOWER(low, high) + UPPER(low, high)), 0, to);
 }
 
 __kernel void cone_runs(__global float* out, __global const float* table, __global const ConeView* views,
@@ -128,9 +152,16 @@ __kernel void cone_runs(__global float* out, __global const float* table, __glob
     const int together = min(TOGETHER, s.views - k);
     for (int y = 0; y < VDVR_CONE_ROWS; ++y)
       for (int x = ranges[y].x; x <= ranges[y].y; ++x) {
+        // By themselves: processors find several at once.
+        Place places[TOGETHER];
         for (int i = 0; i < together; ++i)
-          look_at(seen + i, table + (size_t)(k + i) * s.plane, of_tile + k + i, (double)x - half_side,
-                  (double)(first_y + y) - half_side, dz, heights, s.column_stride, s.last_column, s.last_row);
+          places[i] = place_in(of_tile + k + i, (double)x - half_side, (double)(first_y + y) - half_side, dz,
+                               heights, s);
+        for (int i = 0; i < together; ++i) {
+          make_strip(seen[i].strip, table + (size_t)(k + i) * s.plane + places[i].first, s.column_stride,
+                     places[i].chunks, places[i].weight);
+          place_heights(seen + i, places[i].lowest, places[i].slope, places[i].whole, places[i].last);
+        }
         float* to = sums + (y * VDVR_CONE_TILE + x) * RUN;
         for (int j = 0; j < heights; j += VDVR_LANES) add_heights(to + j, seen, together, j);
       }

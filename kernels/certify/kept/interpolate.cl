@@ -30,12 +30,23 @@
     rest##c += (total##c - (t - part)) + (sum##c - part); \
     total##c = t;                                         \
   }
-#define BEGIN_ODD(c) VEC odd##c = (VEC)(0.0f);
-#define ADD_ODD(c) odd##c = fma((VEC)(column##c[j + 1]), w_odd, odd##c);
 #define PUT_COLUMN(c, v) \
   if (x + c < p.columns_x) STORE(v, target + c * s.out_x);
 #define PUT_TOTAL(c) PUT_COLUMN(c, total##c + rest##c)
-#define PUT_BOTH(c) PUT_COLUMN(c, sum##c + odd##c)
+// Chains of a column, each of every so manieth term.
+#define BEGIN_CHAINS(c) \
+  VEC chain0##c = (VEC)(0.0f), chain1##c = chain0##c, chain2##c = chain0##c, chain3##c = chain0##c;
+#define ADD_TO_0(c) chain0##c = fma((VEC)(column##c[j]), w, chain0##c);
+#define ADD_TO_1(c) chain1##c = fma((VEC)(column##c[j + 1]), w, chain1##c);
+#define ADD_TO_2(c) chain2##c = fma((VEC)(column##c[j + 2]), w, chain2##c);
+#define ADD_TO_3(c) chain3##c = fma((VEC)(column##c[j + 3]), w, chain3##c);
+#define ADD_TERM(i, FOR_COLUMNS)                            \
+  {                                                         \
+    const VEC w = LOAD(of_group + (size_t)j * 16 + (i)*16); \
+    FOR_COLUMNS(ADD_TO_##i)                                 \
+  }
+#define PUT_2(c) PUT_COLUMN(c, chain0##c + chain1##c)
+#define PUT_4(c) PUT_COLUMN(c, (chain0##c + chain1##c) + (chain2##c + chain3##c))
 
 // out[y][x][16 group + i] = sum_j weights[group][j][i] in[y][x][first_term[group] + j], part by part, COLUMNS
 // columns a work-item.
@@ -68,26 +79,36 @@
   }                                                         \
   FOR_8(PUT_TOTAL);
 
-// Of a narrow band: every other one by itself, so that either chain has half of a filter's taps, wherever
-// these begin. Terms of weight 0 change nothing.
-#define IN_BAND                                                                                  \
-  FOR_4(COLUMN);                                                                                 \
-  FOR_4(BEGIN_SUM);                                                                              \
-  FOR_4(BEGIN_ODD);                                                                              \
-  int j = 0;                                                                                     \
-  for (; j + 1 < s.terms; j += 2) {                                                              \
-    const VEC w = LOAD(of_group + (size_t)j * 16), w_odd = LOAD(of_group + (size_t)j * 16 + 16); \
-    FOR_4(ADD);                                                                                  \
-    FOR_4(ADD_ODD);                                                                              \
-  }                                                                                              \
-  if (j < s.terms) {                                                                             \
-    const VEC w = LOAD(of_group + (size_t)j * 16);                                               \
-    FOR_4(ADD);                                                                                  \
-  }                                                                                              \
-  FOR_4(PUT_BOTH);
+// Of a narrow band: in chains of every other term, or of every fourth, so that each has its share of a
+// filter's taps, wherever these begin. Terms of weight 0 change nothing.
+#define IN_TWO_CHAINS                 \
+  FOR_4(COLUMN);                      \
+  FOR_4(BEGIN_CHAINS);                \
+  int j = 0;                          \
+  for (; j + 1 < s.terms; j += 2) {   \
+    ADD_TERM(0, FOR_4)                \
+    ADD_TERM(1, FOR_4)                \
+  }                                   \
+  if (j < s.terms) ADD_TERM(0, FOR_4) \
+  FOR_4(PUT_2);
+#define IN_FOUR_CHAINS                    \
+  FOR_3(COLUMN);                          \
+  FOR_3(BEGIN_CHAINS);                    \
+  int j = 0;                              \
+  for (; j + 3 < s.terms; j += 4) {       \
+    ADD_TERM(0, FOR_3)                    \
+    ADD_TERM(1, FOR_3)                    \
+    ADD_TERM(2, FOR_3)                    \
+    ADD_TERM(3, FOR_3)                    \
+  }                                       \
+  if (j < s.terms) ADD_TERM(0, FOR_3)     \
+  if (j + 1 < s.terms) ADD_TERM(1, FOR_3) \
+  if (j + 2 < s.terms) ADD_TERM(2, FOR_3) \
+  FOR_3(PUT_4);
 
 ALONG_Z(along_z, 8, IN_RUNS)
-ALONG_Z(along_z_in_band, 4, IN_BAND)
+ALONG_Z(along_z_in_two, 4, IN_TWO_CHAINS)
+ALONG_Z(along_z_in_four, 3, IN_FOUR_CHAINS)
 
 // --- across z ---
 
