@@ -45,51 +45,61 @@ double absolute_sum(std::span<const double> values) {
 // Trigonometric interpolation in 2n points makes errors at them grow by no more.
 double growth(std::int64_t n) { return 2 / pi * std::log(2.0 * static_cast<double>(n)) + 1.5; }
 
-// Points, or heights, side by side, whatever vectors the processor has.
+// Points, or heights, side by side.
 constexpr std::size_t group = 8;
 constexpr auto step = static_cast<std::int64_t>(group);
-typedef double Eight __attribute__((vector_size(group * sizeof(double)), aligned(8), may_alias));
-const Eight& eight_at(const double* p) { return *reinterpret_cast<const Eight*>(p); }
-Eight& eight_at(double* p) { return *reinterpret_cast<Eight*>(p); }
 
 // waves[l][i] = cos(l x[i]) for l < n, turned on from one l to the next.
-VDVR_WIDE void turn_on(const double* cosine, const double* sine, std::int64_t n, double* waves) {
-  const Eight c = eight_at(cosine), s = eight_at(sine);
-  Eight re = Eight{} + 1.0, im{};
-  for (std::int64_t l = 0; l < n; ++l) {
-    eight_at(waves + l * step) = re;
-    const Eight next = re * c - im * s;
-    im = im * c + re * s;
-    re = next;
+template <std::int64_t N>
+VDVR_ALWAYS_INLINE void turn_on_in(const double* cosine, const double* sine, std::int64_t n, double* waves) {
+  using Points = wide::Doubles<N>;
+  for (std::int64_t i = 0; i < step; i += N) {
+    const typename Points::Vector c = Points::at(cosine + i), s = Points::at(sine + i);
+    typename Points::Vector re = typename Points::Vector{} + 1.0, im{};
+    for (std::int64_t l = 0; l < n; ++l) {
+      Points::at(waves + l * step + i) = re;
+      const typename Points::Vector next = re * c - im * s;
+      im = im * c + re * s;
+      re = next;
+    }
   }
 }
+VDVR_IN_WIDTHS(turn_on, (const double* cosine, const double* sine, std::int64_t n, double* waves),
+               (cosine, sine, n, waves))
 
 // sums[m][i] = sum over l of a[m][l] waves[l][i]. One sum after the other would wait for each of its
 // additions: four columns' take turns.
-VDVR_WIDE void sum_columns(const double* a, std::int64_t columns, std::int64_t rows, const double* waves,
-                           double* sums) {
-  std::int64_t m = 0;
-  for (; m + 4 <= columns; m += 4) {
-    Eight s0{}, s1{}, s2{}, s3{};
-    const double* of = a + m * rows;
-    for (std::int64_t l = 0; l < rows; ++l, ++of) {
-      const Eight wave = eight_at(waves + l * step);
-      s0 += of[0] * wave;
-      s1 += of[rows] * wave;
-      s2 += of[2 * rows] * wave;
-      s3 += of[3 * rows] * wave;
+template <std::int64_t N>
+VDVR_ALWAYS_INLINE void sum_columns_in(const double* a, std::int64_t columns, std::int64_t rows,
+                                       const double* waves, double* sums) {
+  using Points = wide::Doubles<N>;
+  for (std::int64_t i = 0; i < step; i += N, waves += N, sums += N) {
+    std::int64_t m = 0;
+    for (; m + 4 <= columns; m += 4) {
+      typename Points::Vector s0{}, s1{}, s2{}, s3{};
+      const double* of = a + m * rows;
+      for (std::int64_t l = 0; l < rows; ++l, ++of) {
+        const typename Points::Vector wave = Points::at(waves + l * step);
+        s0 += of[0] * wave;
+        s1 += of[rows] * wave;
+        s2 += of[2 * rows] * wave;
+        s3 += of[3 * rows] * wave;
+      }
+      Points::at(sums + m * step) = s0;
+      Points::at(sums + (m + 1) * step) = s1;
+      Points::at(sums + (m + 2) * step) = s2;
+      Points::at(sums + (m + 3) * step) = s3;
     }
-    eight_at(sums + m * step) = s0;
-    eight_at(sums + (m + 1) * step) = s1;
-    eight_at(sums + (m + 2) * step) = s2;
-    eight_at(sums + (m + 3) * step) = s3;
-  }
-  for (; m < columns; ++m) {
-    Eight sum{};
-    for (std::int64_t l = 0; l < rows; ++l) sum += a[m * rows + l] * eight_at(waves + l * step);
-    eight_at(sums + m * step) = sum;
+    for (; m < columns; ++m) {
+      typename Points::Vector sum{};
+      for (std::int64_t l = 0; l < rows; ++l) sum += a[m * rows + l] * Points::at(waves + l * step);
+      Points::at(sums + m * step) = sum;
+    }
   }
 }
+VDVR_IN_WIDTHS(sum_columns,
+               (const double* a, std::int64_t columns, std::int64_t rows, const double* waves, double* sums),
+               (a, columns, rows, waves, sums))
 
 /// Which of n points, or heights, a task takes: whole groups, as many as leave every thread some tasks.
 struct GroupTasks {
@@ -108,11 +118,18 @@ struct GroupTasks {
 };
 
 // sum over m of lines[m][i] waves[m][i].
-VDVR_WIDE void sum_lines(const double* lines, const double* waves, std::int64_t n, double* out) {
-  Eight sum{};
-  for (std::int64_t m = 0; m < n; ++m) sum += eight_at(lines + m * step) * eight_at(waves + m * step);
-  eight_at(out) = sum;
+template <std::int64_t N>
+VDVR_ALWAYS_INLINE void sum_lines_in(const double* lines, const double* waves, std::int64_t n, double* out) {
+  using Points = wide::Doubles<N>;
+  for (std::int64_t i = 0; i < step; i += N) {
+    typename Points::Vector sum{};
+    for (std::int64_t m = 0; m < n; ++m)
+      sum += Points::at(lines + m * step + i) * Points::at(waves + m * step + i);
+    Points::at(out + i) = sum;
+  }
 }
+VDVR_IN_WIDTHS(sum_lines, (const double* lines, const double* waves, std::int64_t n, double* out),
+               (lines, waves, n, out))
 
 // cos(l pi (place + 1/2) / n) for l < n of each place: [l][place].
 void put_waves(const std::array<double, group>& places, std::int64_t n, std::vector<double>& waves) {

@@ -9,28 +9,28 @@ namespace vdvr {
 namespace {
 
 constexpr std::int64_t lanes = 8, rows_together = 4;
-typedef double Lanes
-    __attribute__((vector_size(lanes * sizeof(double)), aligned(alignof(double)), may_alias));
-
-const Lanes& lanes_at(const double* p) { return *reinterpret_cast<const Lanes*>(p); }
-Lanes& lanes_at(double* p) { return *reinterpret_cast<Lanes*>(p); }
 
 // Of four rows, a[row][n], and a panel, b[n][lanes]: out[row][lanes].
-VDVR_WIDE void four_rows(const double* a, std::int64_t n, const double* b, double* out) {
+template <std::int64_t N>
+VDVR_ALWAYS_INLINE void four_rows_in(const double* a, std::int64_t n, const double* b, double* out) {
+  using Lanes = wide::Doubles<N>;
   const double *a0 = a, *a1 = a + n, *a2 = a + 2 * n, *a3 = a + 3 * n;
-  Lanes s0{}, s1{}, s2{}, s3{};
-  for (std::int64_t i = 0; i < n; ++i) {
-    const Lanes of = lanes_at(b + i * lanes);
-    s0 += a0[i] * of;
-    s1 += a1[i] * of;
-    s2 += a2[i] * of;
-    s3 += a3[i] * of;
+  for (std::int64_t lane = 0; lane < lanes; lane += N, b += N, out += N) {
+    typename Lanes::Vector s0{}, s1{}, s2{}, s3{};
+    for (std::int64_t i = 0; i < n; ++i) {
+      const typename Lanes::Vector of = Lanes::at(b + i * lanes);
+      s0 += a0[i] * of;
+      s1 += a1[i] * of;
+      s2 += a2[i] * of;
+      s3 += a3[i] * of;
+    }
+    Lanes::at(out) = s0;
+    Lanes::at(out + lanes) = s1;
+    Lanes::at(out + 2 * lanes) = s2;
+    Lanes::at(out + 3 * lanes) = s3;
   }
-  lanes_at(out) = s0;
-  lanes_at(out + lanes) = s1;
-  lanes_at(out + 2 * lanes) = s2;
-  lanes_at(out + 3 * lanes) = s3;
 }
+VDVR_IN_WIDTHS(four_rows, (const double* a, std::int64_t n, const double* b, double* out), (a, n, b, out))
 
 }  // namespace
 

@@ -10,23 +10,19 @@ namespace vdvr::cosine_sums {
 
 namespace {
 
-// Rows side by side, whatever vectors the processor has.
-typedef double Rows __attribute__((vector_size(lanes * sizeof(double)), aligned(8), may_alias));
-
-const Rows& rows_at(const double* p) { return *reinterpret_cast<const Rows*>(p); }
-Rows& rows_at(double* p) { return *reinterpret_cast<Rows*>(p); }
-
 // One sum after the other would wait for each of its additions: several columns' take turns. Named, they stay
 // in registers.
 constexpr std::int64_t columns_together = 6;
 
-VDVR_WIDE void six_columns(const double* a, std::int64_t V, const double* basis, std::int64_t rows,
-                           double* line) {
-  for (std::int64_t r = 0; r < rows; r += lanes) {
-    Rows s0{}, s1{}, s2{}, s3{}, s4{}, s5{};
+template <std::int64_t N>
+VDVR_ALWAYS_INLINE void six_columns_in(const double* a, std::int64_t V, const double* basis,
+                                       std::int64_t rows, double* line) {
+  using Rows = wide::Doubles<N>;
+  for (std::int64_t r = 0; r < rows; r += N) {
+    typename Rows::Vector s0{}, s1{}, s2{}, s3{}, s4{}, s5{};
     const double* c = a;
     for (const double *b = basis + r, *end = b + V * rows; b < end; b += rows, ++c) {
-      const Rows wave = rows_at(b);
+      const typename Rows::Vector wave = Rows::at(b);
       s0 += c[0] * wave;
       s1 += c[V] * wave;
       s2 += c[2 * V] * wave;
@@ -34,23 +30,31 @@ VDVR_WIDE void six_columns(const double* a, std::int64_t V, const double* basis,
       s4 += c[4 * V] * wave;
       s5 += c[5 * V] * wave;
     }
-    rows_at(line + r) = s0;
-    rows_at(line + rows + r) = s1;
-    rows_at(line + 2 * rows + r) = s2;
-    rows_at(line + 3 * rows + r) = s3;
-    rows_at(line + 4 * rows + r) = s4;
-    rows_at(line + 5 * rows + r) = s5;
+    Rows::at(line + r) = s0;
+    Rows::at(line + rows + r) = s1;
+    Rows::at(line + 2 * rows + r) = s2;
+    Rows::at(line + 3 * rows + r) = s3;
+    Rows::at(line + 4 * rows + r) = s4;
+    Rows::at(line + 5 * rows + r) = s5;
   }
 }
+VDVR_IN_WIDTHS(six_columns,
+               (const double* a, std::int64_t V, const double* basis, std::int64_t rows, double* line),
+               (a, V, basis, rows, line))
 
-VDVR_WIDE void one_column(const double* a, std::int64_t V, const double* basis, std::int64_t rows,
-                          double* line) {
-  for (std::int64_t r = 0; r < rows; r += lanes) {
-    Rows sum{};
-    for (std::int64_t l = 0; l < V; ++l) sum += a[l] * rows_at(basis + l * rows + r);
-    rows_at(line + r) = sum;
+template <std::int64_t N>
+VDVR_ALWAYS_INLINE void one_column_in(const double* a, std::int64_t V, const double* basis, std::int64_t rows,
+                                      double* line) {
+  using Rows = wide::Doubles<N>;
+  for (std::int64_t r = 0; r < rows; r += N) {
+    typename Rows::Vector sum{};
+    for (std::int64_t l = 0; l < V; ++l) sum += a[l] * Rows::at(basis + l * rows + r);
+    Rows::at(line + r) = sum;
   }
 }
+VDVR_IN_WIDTHS(one_column,
+               (const double* a, std::int64_t V, const double* basis, std::int64_t rows, double* line),
+               (a, V, basis, rows, line))
 
 }  // namespace
 

@@ -19,41 +19,51 @@ constexpr std::int64_t element = CosineTransform::together, imaginary = element 
 // Elements that stay in the first cache.
 constexpr std::int64_t cached_elements = 128;
 
-// Real or imaginary parts of an element, whatever vectors the processor has.
-typedef double Eight __attribute__((vector_size(imaginary * sizeof(double)), aligned(8), may_alias));
-typedef float EightFloats __attribute__((vector_size(imaginary * sizeof(float)), aligned(4), may_alias));
-
-const Eight& eight_at(const double* p) { return *reinterpret_cast<const Eight*>(p); }
-Eight& eight_at(double* p) { return *reinterpret_cast<Eight*>(p); }
-
 // Waves m and -m of the circle, of half the size each: (a + i b) e^(i phase) and (a + i b) e^(-i phase).
-VDVR_WIDE void put_waves(const double* a, std::int64_t stride, std::int64_t terms, const double* phase,
-                         double* x, std::int64_t length) {
+template <std::int64_t N>
+VDVR_ALWAYS_INLINE void put_waves_in(const double* a, std::int64_t stride, std::int64_t terms,
+                                     const double* phase, double* x, std::int64_t length) {
+  using Parts = wide::Doubles<N>;
   std::fill_n(x, length * element, 0.0);
   for (std::int64_t m = 0; m < terms; ++m, a += stride, phase += 2) {
-    const Eight re = 0.5 * eight_at(a), im = 0.5 * eight_at(a + imaginary);
     double *up = x + m * element, *down = x + (length - m) % length * element;
     const double c = phase[0], s = phase[1];
-    eight_at(up) += re * c - im * s;
-    eight_at(up + imaginary) += re * s + im * c;
-    eight_at(down) += re * c + im * s;
-    eight_at(down + imaginary) += im * c - re * s;
+    for (std::int64_t i = 0; i < imaginary; i += N) {
+      const typename Parts::Vector re = 0.5 * Parts::at(a + i), im = 0.5 * Parts::at(a + imaginary + i);
+      Parts::at(up + i) += re * c - im * s;
+      Parts::at(up + imaginary + i) += re * s + im * c;
+      Parts::at(down + i) += re * c + im * s;
+      Parts::at(down + imaginary + i) += im * c - re * s;
+    }
   }
 }
+VDVR_IN_WIDTHS(put_waves,
+               (const double* a, std::int64_t stride, std::int64_t terms, const double* phase, double* x,
+                std::int64_t length),
+               (a, stride, terms, phase, x, length))
 
 // One stage: sums of the halves' elements, and their differences turned.
-VDVR_WIDE void halve(double* x, std::int64_t size, const double* root, std::int64_t root_stride) {
+template <std::int64_t N>
+VDVR_ALWAYS_INLINE void halve_in(double* x, std::int64_t size, const double* root, std::int64_t root_stride) {
+  using Parts = wide::Doubles<N>;
   double *low = x, *high = x + size / 2 * element;
   for (std::int64_t j = 0; j < size / 2; ++j, low += element, high += element) {
-    const Eight a_re = eight_at(low), a_im = eight_at(low + imaginary), b_re = eight_at(high),
-                b_im = eight_at(high + imaginary), re = a_re - b_re, im = a_im - b_im;
     const double c = root[2 * j * root_stride], s = root[2 * j * root_stride + 1];
-    eight_at(low) = a_re + b_re;
-    eight_at(low + imaginary) = a_im + b_im;
-    eight_at(high) = re * c - im * s;
-    eight_at(high + imaginary) = re * s + im * c;
+    for (std::int64_t i = 0; i < imaginary; i += N) {
+      double *low_re = low + i, *low_im = low_re + imaginary, *high_re = high + i,
+             *high_im = high_re + imaginary;
+      const typename Parts::Vector a_re = Parts::at(low_re), a_im = Parts::at(low_im),
+                                   b_re = Parts::at(high_re), b_im = Parts::at(high_im), re = a_re - b_re,
+                                   im = a_im - b_im;
+      Parts::at(low_re) = a_re + b_re;
+      Parts::at(low_im) = a_im + b_im;
+      Parts::at(high_re) = re * c - im * s;
+      Parts::at(high_im) = re * s + im * c;
+    }
   }
 }
+VDVR_IN_WIDTHS(halve, (double* x, std::int64_t size, const double* root, std::int64_t root_stride),
+               (x, size, root, root_stride))
 
 // In place; frequencies come out with their bits reversed. Halves, until a part fits into the cache.
 void transform_part(double* x, std::int64_t size, const double* root, std::int64_t root_stride) {
@@ -68,30 +78,37 @@ void transform_part(double* x, std::int64_t size, const double* root, std::int64
       halve(x + first * element, part, root, root_stride * (size / part));
 }
 
-VDVR_WIDE double largest_magnitude(const double* x, std::int64_t elements) {
-  Eight high{};
-  for (const double* p = x; p < x + elements * element; p += imaginary) {
-    const Eight v = eight_at(p), magnitude = v < 0 ? -v : v;
+template <std::int64_t N>
+VDVR_ALWAYS_INLINE void raise_to_magnitudes_in(const double* x, std::int64_t elements, double* sup) {
+  using Parts = wide::Doubles<N>;
+  typename Parts::Vector high{};
+  for (const double* p = x; p < x + elements * element; p += N) {
+    const typename Parts::Vector v = Parts::at(p), magnitude = v < 0 ? -v : v;
     high = magnitude > high ? magnitude : high;
   }
-  double sup = 0;
-  for (std::int64_t i = 0; i < imaginary; ++i) sup = std::max(sup, high[i]);
-  return sup;
+  for (std::int64_t i = 0; i < N; ++i) *sup = std::max(*sup, high[i]);
 }
+VDVR_IN_WIDTHS(raise_to_magnitudes, (const double* x, std::int64_t elements, double* sup), (x, elements, sup))
 
 // The transform's place `index` is the `shifts` index + `shift` th of the circle, a quarter of a step
 // further.
-VDVR_WIDE void put_floats(const double* x, std::int64_t length, std::int64_t shift, std::int64_t shifts,
-                          const std::int32_t* index, double scale, float* out, std::int64_t out_stride) {
+template <std::int64_t N>
+VDVR_ALWAYS_INLINE void put_floats_in(const double* x, std::int64_t length, std::int64_t shift,
+                                      std::int64_t shifts, const std::int32_t* index, double scale,
+                                      float* out, std::int64_t out_stride) {
+  using Parts = wide::Doubles<N>;
   for (std::int64_t i = 0; i < length; ++i, x += element) {
     const std::int64_t around = index[i] * shifts + shift, all = length * shifts,
                        n = 2 * around < all ? 2 * around : 2 * (all - around) - 1;
-    float* to = out + n * out_stride;
-    *reinterpret_cast<EightFloats*>(to) = __builtin_convertvector(eight_at(x) * scale, EightFloats);
-    *reinterpret_cast<EightFloats*>(to + imaginary) =
-        __builtin_convertvector(eight_at(x + imaginary) * scale, EightFloats);
+    for (std::int64_t part = 0; part < element; part += N)
+      Parts::at(out + n * out_stride + part) =
+          __builtin_convertvector(Parts::at(x + part) * scale, typename Parts::Floats);
   }
 }
+VDVR_IN_WIDTHS(put_floats,
+               (const double* x, std::int64_t length, std::int64_t shift, std::int64_t shifts,
+                const std::int32_t* index, double scale, float* out, std::int64_t out_stride),
+               (x, length, shift, shifts, index, scale, out, out_stride))
 
 }  // namespace
 
@@ -129,7 +146,7 @@ double CosineTransform::largest(const double* a, std::int64_t stride, std::vecto
   double sup = 0;
   for (std::int64_t shift = 0; shift < shifts_; ++shift) {
     transform(a, stride, shift, work);
-    sup = std::max(sup, largest_magnitude(work.data(), length_));
+    raise_to_magnitudes(work.data(), length_, &sup);
   }
   return sup;
 }
