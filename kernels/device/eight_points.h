@@ -15,23 +15,23 @@
 #define ODD_5 ODD(1.0f / 576, -59.0f / 2880, 5.0f / 64, -83.0f / 576)
 #define ODD_3 ODD(-37.0f / 11520, 499.0f / 11520, -433.0f / 1280, 1891.0f / 2304)
 #define ODD_1 ODD(5.0f / 7168, -49.0f / 5120, 245.0f / 3072, -1225.0f / 1024)
+// Even and odd powers, of g's square and of coefficients that `OF` brings there.
+#define EVEN_POWERS(s, OF) fma(s, fma(s, fma(s, OF(EVEN_6), OF(EVEN_4)), OF(EVEN_2)), OF(EVEN_0))
+#define ODD_POWERS(s, OF) fma(s, fma(s, fma(s, OF(ODD_7), OF(ODD_5)), OF(ODD_3)), OF(ODD_1))
 #define OF_EIGHT(weights) weights
-#define OF_TWO(weights) (float16)(weights, weights)
-#define WEIGHTS(NAME, TYPE, PLACE, OF)                              \
-  static inline __attribute__((always_inline)) TYPE NAME(PLACE f) { \
-    const TYPE g = (TYPE)(f - 0.5f), s = g * g;                     \
-    TYPE even = OF(EVEN_6), odd = OF(ODD_7);                        \
-    even = fma(s, even, OF(EVEN_4));                                \
-    odd = fma(s, odd, OF(ODD_5));                                   \
-    even = fma(s, even, OF(EVEN_2));                                \
-    odd = fma(s, odd, OF(ODD_3));                                   \
-    even = fma(s, even, OF(EVEN_0));                                \
-    odd = fma(s, odd, OF(ODD_1));                                   \
-    return fma(g, odd, even);                                       \
-  }
-WEIGHTS(lagrange, float8, float, OF_EIGHT)
-// Those of two places, each of which fills one half of `f`.
-WEIGHTS(lagrange_of_two, float16, float16, OF_TWO)
+#define OF_FOUR_TIMES_FOUR(weights) (float16)((weights).lo, (weights).lo, (weights).lo, (weights).lo)
+static inline __attribute__((always_inline)) float8 lagrange(float f) {
+  const float8 g = (float8)(f - 0.5f), s = g * g;
+  return fma(g, ODD_POWERS(s, OF_EIGHT), EVEN_POWERS(s, OF_EIGHT));
+}
+// Those of four places, each of which fills a quarter of `f`: of the nodes -3 .. 0 in `low`, and in `high` of
+// the nodes 4, 3, 2 and 1, in this order.
+static inline __attribute__((always_inline)) void lagrange_of_four(float16 f, float16* low, float16* high) {
+  const float16 g = f - 0.5f, s = g * g, even = EVEN_POWERS(s, OF_FOUR_TIMES_FOUR),
+                odd = ODD_POWERS(s, OF_FOUR_TIMES_FOUR);
+  *low = fma(g, odd, even);
+  *high = fma(-g, odd, even);
+}
 
 // Adds to `sum` what eight places take of the points that `POINT(0)` .. `POINT(7)` are of each: by g, their
 // way from the middle between 0 and 1, of at most 1. Weights of these err together by 22.9 2^-24 at most.
@@ -56,7 +56,6 @@ WEIGHTS(lagrange_of_two, float16, float16, OF_TWO)
     sum = fma(fma(-(g), odd, even), POINT(j), sum);       \
   }
 
-#undef WEIGHTS
 #undef OF_EIGHT
-#undef OF_TWO
+#undef OF_FOUR_TIMES_FOUR
 #endif

@@ -1,11 +1,15 @@
 // The weights of device/eight_points.h, for eight_points_test.cpp, which puts this text behind that header.
-// Layouts: float places[item]; float weights[item][8], by themselves, then two items at a time.
+// Layouts: float places[item]; float weights[item][8], by themselves, then four items at a time.
 __kernel void weigh(__global const float* places, __global float* weights, int items) {
-  const int i = (int)get_global_id(0), pair = i / 2 * 2;
+  const int i = (int)get_global_id(0), first = i / 4 * 4;
   if (i >= items) return;
   vstore8(lagrange(places[i]), i, weights);
-  const float16 of_two = lagrange_of_two((float16)((float8)(places[pair]), (float8)(places[pair + 1])));
-  vstore8(i == pair ? of_two.lo : of_two.hi, items + i, weights);
+  const float4 four = vload4(0, places + first);
+  float16 low, high;
+  lagrange_of_four(four.s0000111122223333, &low, &high);
+  const float4 below[4] = {low.s0123, low.s4567, low.s89ab, low.scdef},
+               above[4] = {high.s3210, high.s7654, high.sba98, high.sfedc};
+  vstore8((float8)(below[i - first], above[i - first]), items + i, weights);
 }
 
 // weights[n][place]: what is added where point n alone is 1.

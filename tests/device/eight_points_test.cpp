@@ -47,8 +47,8 @@ BOOST_AUTO_TEST_CASE(eight_weights_are_lagranges) {
   cl::KernelFunctor<cl::Buffer, cl::Buffer, int> weigh(build_weights(state), "weigh");
   weigh(cl::EnqueueArgs(state.queue, cl::NDRange(items)), on_device.buffer(), weights.buffer(), items);
   std::vector<float> found = weights.to_host();
-  const auto of_two = found.begin() + 8 * items;
-  BOOST_TEST(std::equal(found.begin(), of_two, of_two));  // to the bit
+  const auto of_four = found.begin() + 8 * items;
+  BOOST_TEST(std::equal(found.begin(), of_four, of_two));  // to the bit
   double worst = 0;
   for (std::size_t i = 0; i < places.size(); ++i) {
     double errors = 0;

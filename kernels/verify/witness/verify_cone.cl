@@ -162,32 +162,49 @@ static inline ALWAYS_INLINE void look_up(Seen* seen, __global const View* view, 
 #endif
 }
 
-#define FOR_PAIRS(DO) DO(0) DO(1) DO(2) DO(3)
-#define TAKE(n) float16 sum##n = vload16(n, of);
-#define OF_PAIR(values, n) (float16)((float8)(values[2 * n]), (float8)(values[2 * n + 1]))
+// Sums of eight heights: of four at a time those of the four points below, then those of the points above
+// from the outside in, which have the same polynomials. Heights 0, 4, 1 and 5 come first, then 2, 6, 3 and 7:
+// processors spread places within halves of a vector.
+typedef struct {
+  float16 below[2], above[2];
+} Sums;
+
+typedef float8 __attribute__((aligned(4))) LooseEight;
+typedef float4 __attribute__((aligned(4))) LooseFour;
+#define ROWS_BELOW(i) *(const LooseFour*)(strip + row[i])
+#define ROWS_ABOVE(i) (*(const LooseFour*)(strip + row[i] + 4)).wzyx
+#define ROWS_OF(ROWS, i, j) (float16)(ROWS(i), ROWS(i + 4), ROWS(j), ROWS(j + 4))
 #if VDVR_UPRIGHT
-#define WEIGH(weights, n) weights
+#define WEIGH(weights, EACH) weights
 #else
-#define WEIGH(weights, n) (OF_PAIR(weight, n) * weights)
+#define WEIGH(weights, EACH) ((*(const LooseEight*)(seen[v].weight + first)).EACH * weights)
 #endif
-#define ADD_ROWS(n)                                                                                   \
-  {                                                                                                   \
-    const float16 rows = (float16)(vload8(0, strip + row[2 * n]), vload8(0, strip + row[2 * n + 1])); \
-    sum##n = fma(WEIGH(lagrange_of_two(OF_PAIR(part, n)), n), rows, sum##n);                          \
+#define ADD_FOUR(n, i, j, EACH)                                         \
+  {                                                                     \
+    float16 below = of->below[n], above = of->above[n];                 \
+    for (int v = 0; v < views; ++v) {                                   \
+      const float* strip = (const float*)seen[v].strip;                 \
+      const int* row = seen[v].row + first;                             \
+      const float8 part = *(const LooseEight*)(seen[v].part + first);   \
+      float16 low, high;                                                \
+      lagrange_of_four(part.EACH, &low, &high);                         \
+      below = fma(WEIGH(low, EACH), ROWS_OF(ROWS_BELOW, i, j), below);  \
+      above = fma(WEIGH(high, EACH), ROWS_OF(ROWS_ABOVE, i, j), above); \
+    }                                                                   \
+    of->below[n] = below;                                               \
+    of->above[n] = above;                                               \
   }
-#define KEEP(n) vstore16(sum##n, n, of);
-// Adds some views at eight heights, from `first` of the block on, two of them in a vector.
-static inline ALWAYS_INLINE void add_views(float* of, const Seen* seen, int views, int first) {
-  FOR_PAIRS(TAKE)
-  for (int i = 0; i < views; ++i) {
-    const float *strip = (const float*)seen[i].strip, *part = seen[i].part + first;
-    const int* row = seen[i].row + first;
-#if !VDVR_UPRIGHT
-    const float* weight = seen[i].weight + first;
-#endif
-    FOR_PAIRS(ADD_ROWS)
-  }
-  FOR_PAIRS(KEEP)
+// Adds some views at eight heights, from `first` of the block on.
+static inline ALWAYS_INLINE void add_views(Sums* of, const Seen* seen, int views, int first) {
+  ADD_FOUR(0, 0, 1, s0000444411115555)
+  ADD_FOUR(1, 2, 3, s2222666633337777)
+}
+
+// What a height's eight sums add up to.
+#define TOTAL(n, part) sum_of((float8)(s->below[n].s##part, s->above[n].s##part))
+static inline ALWAYS_INLINE float8 totals_of(const Sums* s) {
+  return (float8)(TOTAL(0, 0123), TOTAL(0, 89ab), TOTAL(1, 0123), TOTAL(1, 89ab), TOTAL(0, 4567),
+                  TOTAL(0, cdef), TOTAL(1, 4567), TOTAL(1, cdef));
 }
 
 // Adds the table's views at a block of heights of eight nodes along x.
@@ -204,8 +221,9 @@ __kernel void verify_cone(__global float* nodes, __global const float* table, __
   const float dy = (float)y - 0.5f * (float)(VDVR_VERIFY_TILE - 1);
   const int slot = slots[s.first_tile + tile], more = block * VDVR_VERIFY_CONE_BLOCK + 8 < s.used;
   __global const View* own = numbers + ((size_t)tile * s.blocks + block) * s.views;
-  float8 sums[VDVR_VERIFY_TILE * VDVR_VERIFY_CONE_BLOCK];
-  for (int i = 0; i < VDVR_VERIFY_TILE * VDVR_VERIFY_CONE_BLOCK; ++i) sums[i] = (float8)(0.0f);
+  Sums sums[VDVR_VERIFY_TILE][VDVR_VERIFY_CONE_BLOCK / 8];
+  for (int i = 0; i < VDVR_VERIFY_TILE * VDVR_VERIFY_CONE_BLOCK / 8; ++i)
+    for (int n = 0; n < 2; ++n) sums[i / 2][i % 2].below[n] = sums[i / 2][i % 2].above[n] = (float16)(0.0f);
   Seen seen[VDVR_VERIFY_CONE_VIEWS];
   // Some views go through all eight nodes, whose columns overlap, before the next ones.
   for (int k = 0; k < s.views; k += VDVR_VERIFY_CONE_VIEWS) {
@@ -215,18 +233,17 @@ __kernel void verify_cone(__global float* nodes, __global const float* table, __
       for (int i = 0; i < together; ++i)
         look_up(seen + i, own + k + i, table + (size_t)(k + i) * plane_size, dx, dy, s.rows, last_column,
                 last_row);
-      float* of = (float*)(sums + x * VDVR_VERIFY_CONE_BLOCK);
-      add_views(of, seen, together, 0);
-      if (more) add_views(of + 64, seen, together, 8);
+      add_views(&sums[x][0], seen, together, 0);
+      if (more) add_views(&sums[x][1], seen, together, 8);
     }
   }
   for (int x = range.x; x <= range.y; ++x) {
     __global float* to = nodes +
                          (size_t)((slot * VDVR_VERIFY_TILE + y) * VDVR_VERIFY_TILE + x) * s.all_heights +
                          block * VDVR_VERIFY_CONE_BLOCK;
-    for (int i = 0; i < VDVR_VERIFY_CONE_BLOCK; ++i) {
-      const float sum = sum_of(sums[x * VDVR_VERIFY_CONE_BLOCK + i]);
-      to[i] = s.accumulate ? to[i] + sum : sum;
+    for (int i = 0; i < VDVR_VERIFY_CONE_BLOCK / 8; ++i) {
+      const float8 totals = totals_of(&sums[x][i]);
+      vstore8(s.accumulate ? vload8(i, to) + totals : totals, i, to);
     }
   }
 }
