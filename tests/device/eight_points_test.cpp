@@ -48,7 +48,7 @@ BOOST_AUTO_TEST_CASE(eight_weights_are_lagranges) {
   weigh(cl::EnqueueArgs(state.queue, cl::NDRange(items)), on_device.buffer(), weights.buffer(), items);
   std::vector<float> found = weights.to_host();
   const auto of_four = found.begin() + 8 * items;
-  BOOST_TEST(std::equal(found.begin(), of_four, of_two));  // to the bit
+  BOOST_TEST(std::equal(found.begin(), of_four, of_four));  // to the bit
   double worst = 0;
   for (std::size_t i = 0; i < places.size(); ++i) {
     double errors = 0;
