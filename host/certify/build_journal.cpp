@@ -69,7 +69,7 @@ JournalHead journal_head(const std::vector<Crew::Kind>& devices, const Projectio
   const ParallelGeometry& g = scan.geometry;
   const Index3 blocks = stream.block_bricks();
   JournalHead head{
-      {"record format", "12"},
+      {"record format", "13"},
       {"version", VDVR_VERSION},
       {"device", joined(devices, &DeviceInfo::name)},
       {"driver", joined(devices, &DeviceInfo::driver)},
@@ -83,8 +83,8 @@ JournalHead journal_head(const std::vector<Crew::Kind>& devices, const Projectio
       {"origin", exact_list(plan.grid.origin)},
       {"spacing", exact_list(plan.grid.spacing)},
       {"epsilon", exact(plan.epsilon_abs)},
-      {"rates", fmt::format("u {}x {}, gold {}x", plan.rates.upsampling, text_of(plan.rates.interpolation),
-                            plan.rates.gold)},
+      {"rates", fmt::format("u {}x {}, gold {}x, differences {}x", plan.rates.upsampling,
+                            text_of(plan.rates.interpolation), plan.rates.gold, plan.rates.differences)},
       {"coefficients", text_of(plan.settings.comparison.coefficients)},
       {"levels", text_of(plan.layout.levels)},
       {"terms", text_of(plan.settings.comparison.terms)},

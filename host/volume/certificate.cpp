@@ -252,12 +252,22 @@ void read_noise(const Member& m, Certificate& c) {
   n.sha256 = m.at("brick_sigma_sha256").text();
 }
 
+// Files of earlier programs have none: theirs were dense.
+int read_differences(const Member& m) {
+  const std::int64_t n = m.integer();
+  if (n != dense_differences && n != sparse_differences)
+    throw FileError(fmt::format("certificate: member 'rates.differences' is {}, expected {} or {}", n,
+                                sparse_differences, dense_differences));
+  return static_cast<int>(n);
+}
+
 void read_method(const Member& m, Certificate& c) {
   const Member rates = m.at("rates"), field = m.at("field");
   c.rates.upsampling = rates.at("upsampling_u").rate();
   c.rates.interpolation =
       rates.at("u_filter").choice(interpolation_of, "linear, cubic, six-taps or eight-taps");
   c.rates.gold = rates.at("gold").rate();
+  if (rates.has("differences")) c.rates.differences = read_differences(rates.at("differences"));
   c.bounds = read_bounds(m.at("bounds"));
   c.field.filter = field.at("filter").choice(ramp_window_of, "ram-lak, shepp-logan, cosine, hamming or hann");
   c.field.cutoff = field.at("cutoff").number();
@@ -413,6 +423,7 @@ std::string to_json(const Certificate& c) {
   j["rates"] = {{"upsampling_u", c.rates.upsampling},
                 {"u_filter", text_of(c.rates.interpolation)},
                 {"gold", c.rates.gold}};
+  if (c.rates.interpolation == Interpolation::eight_taps) j["rates"]["differences"] = c.rates.differences;
   j["bounds"] = bounds(c.bounds);
   j["field"] = {{"filter", text_of(c.field.filter)}, {"cutoff", finite("field.cutoff", c.field.cutoff)}};
   j["field"]["center"] = c.field.center ? Json(finite("field.center", *c.field.center)) : Json(nullptr);

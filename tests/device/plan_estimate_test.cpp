@@ -28,6 +28,25 @@ CertifyOptions estimating(bool estimate) {
 
 }  // namespace
 
+// Sixth derivatives are small where sources are far, and grow with the eighth power of how near they are.
+BOOST_AUTO_TEST_CASE(fourth_differences_are_sparse_where_that_costs_little_of_the_tolerance) {
+  Device device;
+  const auto differences = [&](double source, double tolerance, bool estimate = false) {
+    SimulateOptions options;
+    options.angles = 40;
+    options.columns = options.rows = 24;
+    options.arc_deg = 360;
+    options.cone.emplace();
+    options.cone->source_to_axis = options.cone->source_to_detector = source;
+    CertifyOptions wanted;
+    wanted.plan.estimate = estimate;
+    return make_plan(device, simulate(sphere(8), options), {.relative = tolerance}, wanted).rates.differences;
+  };
+  BOOST_TEST(differences(300, 0.2) == sparse_differences);
+  BOOST_TEST(differences(300, 0.2, true) == sparse_differences);
+  BOOST_TEST(differences(30, 0.01) == dense_differences);
+}
+
 BOOST_AUTO_TEST_CASE(an_estimate_is_near_the_plan_and_cannot_be_built) {
   Device device;
   const ProjectionSet scan = large_scan();

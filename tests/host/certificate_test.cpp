@@ -74,6 +74,20 @@ BOOST_AUTO_TEST_CASE(members_have_the_names_of_the_file_format) {
   BOOST_TEST(j["input"]["shape"] == json::parse("[74, 65, 65]"));
 }
 
+BOOST_AUTO_TEST_CASE(how_dense_fourth_differences_are_is_said_of_cone_beam_alone) {
+  Certificate c = full;
+  BOOST_TEST(!json::parse(to_json(c))["rates"].contains("differences"));
+  c.rates = {6, Interpolation::eight_taps, 8, sparse_differences};
+  auto j = nlohmann::ordered_json::parse(to_json(c));
+  BOOST_TEST(j["rates"]["differences"] == 4);
+  BOOST_TEST((certificate_from_json(j.dump()).rates == c.rates));
+  j["rates"]["differences"] = 5;
+  BOOST_CHECK_EXCEPTION(certificate_from_json(j.dump()), FileError,
+                        [](const FileError& e) { return names(e.what(), "rates.differences"); });
+  j["rates"].erase("differences");  // as earlier programs wrote them
+  BOOST_TEST(certificate_from_json(j.dump()).rates.differences == dense_differences);
+}
+
 BOOST_AUTO_TEST_CASE(what_does_not_apply_is_null_or_absent) {
   Certificate c = full;
   c.window.reset();

@@ -87,15 +87,19 @@ Json plan_forecast_json(const Planned& p, const std::optional<PictureForecast>& 
   return json;
 }
 
+Json rates_json(const Rates& rates) {
+  Json json{
+      {"upsampling_u", rates.upsampling}, {"u_filter", text_of(rates.interpolation)}, {"gold", rates.gold}};
+  if (rates.interpolation == Interpolation::eight_taps) json["differences"] = rates.differences;
+  return json;
+}
+
 Json plan_json(const Planned& p, const std::optional<PictureForecast>& forecast) {
   const Plan& plan = p.made.plan;
   return {{"epsilon", plan.epsilon},
           {"epsilon_abs", plan.epsilon_abs},
           {"reference_range", plan.reference_range},
-          {"rates",
-           {{"upsampling_u", plan.rates.upsampling},
-            {"u_filter", text_of(plan.rates.interpolation)},
-            {"gold", plan.rates.gold}}},
+          {"rates", rates_json(plan.rates)},
           {"base", cells_per_base_sample(plan.layout.coarsening)},
           {"bounds", bounds_json(plan.bounds)},
           {"budget", budget_json(plan.budget)},

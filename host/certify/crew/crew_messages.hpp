@@ -63,7 +63,7 @@ void members(auto& way, Of<IntegerLattice> auto& l) {
 void members(auto& way, Of<GoldSettings> auto& s) {
   way(s.grid, s.granularity, s.rate, s.upsampling, s.interpolation, s.window, s.midrange, s.of_noise,
       s.anisotropic, s.base_only, s.grid_only, s.curvature, s.coarse_rate, s.finer_rate, s.coarsening,
-      s.heights_bytes, s.least_reach, s.views_together);
+      s.heights_bytes, s.least_reach, s.differences, s.views_together);
 }
 /// Without the samples.
 void members(auto& way, Of<FilteredScan> auto& s) {

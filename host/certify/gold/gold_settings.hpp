@@ -46,7 +46,8 @@ struct GoldSettings {
 
   /// Of estimates: where gold is kept, the rest counting as 0; all of it where there is none.
   std::optional<PlanePart> part{};
-  double least_reach = 0;  ///< of kept gold: what later settings will ask for
+  double least_reach = 0;               ///< of kept gold: what later settings will ask for
+  int differences = dense_differences;  ///< as Rates has them
   /// Of cone beam, that are summed up together; 0: as many as memory allows. How sums round depends on it, so
   /// that all of a crew take as many.
   std::int64_t views_together = 0;
@@ -60,7 +61,9 @@ struct GoldSettings {
 
 /// Gold at these rates; nothing else is asked of it.
 inline GoldSettings gold_settings(const Grid& grid, int granularity, const Rates& rates) {
-  return {grid, granularity, rates.gold, rates.upsampling, rates.interpolation};
+  GoldSettings out{grid, granularity, rates.gold, rates.upsampling, rates.interpolation};
+  out.differences = rates.differences;
+  return out;
 }
 
 /// The base alone as a volume, every brick at level 0.

@@ -25,10 +25,17 @@ double reach_of_all(GoldSettings settings) {
 GoldSource::GoldSource(opencl::State& state, const FilteredScan& scan, const FieldSups& sups,
                        const GoldSettings& settings)
     : kept(state, scan, sups, settings.grid, gold_reach(settings), settings.upsampling,
-           settings.interpolation, settings.heights_bytes) {
+           settings.interpolation, settings.heights_bytes),
+      state_(state),
+      scan_(scan),
+      sups_(sups) {
   if (settings.part) kept.keep_only(*settings.part);
   if (settings.views_together > 0) kept.take_views_together(settings.views_together);
-  if (!settings.base_only) remainder.emplace(state, kept, scan, sups, settings.grid, settings.granularity);
+  if (!settings.base_only) take_differences(settings);
+}
+
+void GoldSource::take_differences(const GoldSettings& s) {
+  remainder.emplace(state_, kept, scan_, sups_, s.grid, s.granularity, s.differences);
 }
 
 }  // namespace vdvr

@@ -12,8 +12,16 @@ struct GoldSource {
   GoldSource(opencl::State& state, const FilteredScan& scan, const FieldSups& sups,
              const GoldSettings& settings);
 
+  /// What T leaves out as these settings have it, of which nothing was looked at: gold stays kept.
+  void take_differences(const GoldSettings& settings);
+
   KeptGold kept;
   std::optional<BrickRemainder> remainder;  ///< none where only base samples are asked for
+
+ private:
+  opencl::State& state_;
+  const FilteredScan& scan_;
+  const FieldSups& sups_;
 };
 
 /// How far beyond the covered region nodes of gold are wanted, in world units: those that may be stored, and

@@ -62,6 +62,9 @@ std::shared_ptr<GoldSource> PreparedScan::source(const GoldSettings& s) {
     source_ = nullptr;  // before the next one is allocated
     source_ = std::make_shared<GoldSource>(state, filtered, sups, s);
     settings_ = s;
+  } else if (s.differences != settings_.differences) {
+    if (source_->remainder) source_->take_differences(s);
+    settings_.differences = s.differences;
   }
   return source_;
 }

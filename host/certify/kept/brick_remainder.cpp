@@ -37,7 +37,7 @@ std::int64_t stride_of(const GoldBox& box) { return column_stride(box.nodes[2] +
 }  // namespace
 
 BrickRemainder::BrickRemainder(opencl::State& state, KeptGold& kept, const FilteredScan& scan,
-                               const FieldSups& sups, const Grid& grid, int granularity)
+                               const FieldSups& sups, const Grid& grid, int granularity, int differences)
     : state_(state),
       kept_(kept),
       scan_(scan),
@@ -45,11 +45,7 @@ BrickRemainder::BrickRemainder(opencl::State& state, KeptGold& kept, const Filte
       coverage_(scan.geometry, scan.views),
       grid_(grid),
       granularity_(granularity) {
-  // A quarter of a pixel apart at most: of nodes half a pixel apart the norms are three times as large. But
-  // differences are a sixteenth, and what nodes err by is not: with more than six taps leave, half a pixel.
-  if (kept.interpolation() == Interpolation::six_taps) nodes_.phases = {2, 2, 2};
-  if (!scan.views.empty())  // fewer where nodes are denser than half a pixel already
-    for (std::size_t a = 0; a < 3; ++a) nodes_.phases[a] = kept.rates()[a] > 2 ? 2 : 4;
+  nodes_.phases = phases(differences);
   for (std::size_t a = 0; a < 3; ++a) rates_[a] = kept.rates()[a] * nodes_.phases[a];
   bricks_ = Bricks(grid, granularity).along();
   slack_ = kept.fourth_errors(nodes_);
@@ -80,6 +76,24 @@ BrickRemainder::BrickRemainder(opencl::State& state, KeptGold& kept, const Filte
     throw std::logic_error("BrickRemainder: reads gold beyond its bounds");
   read_.emplace(coverage_, read);
   read_z_ = {coverage_.heights().first - read_z, coverage_.heights().second + read_z};
+}
+
+// Of parallel beam a quarter of a pixel apart at most: of nodes half a pixel apart the norms are three times
+// as large. But differences are a sixteenth, and what nodes err by is not: with more than six taps leave,
+// half a pixel.
+std::array<int, 3> BrickRemainder::phases(int differences) const {
+  if (scan_.views.empty()) {
+    const int of_all = kept_.interpolation() == Interpolation::six_taps ? 2 : 1;
+    return {of_all, of_all, of_all};
+  }
+  std::array<int, 3> out{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const std::int64_t kept = kept_.rates()[a];
+    const int dense = kept > 2 ? 2 : 4;
+    // Of one kept node a cell, stencils of sparse ones would reach farther than bounds do.
+    out[a] = differences == sparse_differences && kept > 1 ? dense / 2 : dense;
+  }
+  return out;
 }
 
 void BrickRemainder::set_parallel(const FilteredScan& scan, const FieldSups& sups) {
@@ -378,19 +392,43 @@ float BrickRemainder::of(std::int64_t brick, const GoldLattice& lattice) const {
     for (std::int64_t y = p[1] - rings_[1]; y <= p[1] + rings_[1]; ++y)
       for (std::int64_t x = p[0] - rings_[0]; x <= p[0] + rings_[0]; ++x)
         for (std::size_t d = 0; d < 6; ++d) largest[d] = std::max(largest[d], maxima_[slot({x, y, z})][d]);
-  std::array<double, 3> square{};  // of gold's spacing over that of the nodes
-  for (std::size_t a = 0; a < 3; ++a)
-    square[a] = std::pow(static_cast<double>(lattice.step[a]) * nodes_.phases[a] / lattice.phases[a], 2);
-  const auto sup = [&](std::size_t d) {
+  return round_up(sum_of(lattice, [&](std::size_t d) {
     return static_cast<double>(factor_[d]) * static_cast<double>(largest[d]) +
            static_cast<double>(addend_[d]) +
            (sixth_.empty() ? 0.0 : static_cast<double>(sixth_[at(brick)][d]));
+  }));
+}
+
+double BrickRemainder::largest_of_sixth(const GoldLattice& lattice) {
+  const Bricks bricks(grid_, granularity_);
+  const auto layer_at = [&](double z) {
+    const double layer = (z - grid_.origin[2]) / (static_cast<double>(granularity_) * grid_.spacing[2]);
+    return static_cast<std::int64_t>(std::clamp(layer, 0.0, static_cast<double>(bricks_[2] - 1)));
   };
+  const std::int64_t low = layer_at(coverage_.heights().first), high = layer_at(coverage_.heights().second);
+  std::vector<std::uint8_t> selected(at(bricks.size()), 0);
+  for (const std::int64_t z : {low, (low + high) / 2, high})
+    for (std::int64_t y = 0; y < bricks_[1]; ++y)
+      for (std::int64_t x = 0; x < bricks_[0]; ++x) selected[at(bricks.number({x, y, z}))] = 1;
+  add_sixth(selected);
+  double largest = 0;
+  for (const Maxima& sixth : sixth_)  // 0 where nobody has looked
+    largest =
+        std::max(largest, sum_of(lattice, [&](std::size_t d) { return static_cast<double>(sixth[d]); }));
+  return largest;
+}
+
+// Of X_ij = sup(d) with nodes' spacings.
+template <class Sup>
+double BrickRemainder::sum_of(const GoldLattice& lattice, Sup&& sup) const {
+  std::array<double, 3> square{};  // of gold's spacing over that of the nodes
+  for (std::size_t a = 0; a < 3; ++a)
+    square[a] = std::pow(static_cast<double>(lattice.step[a]) * nodes_.phases[a] / lattice.phases[a], 2);
   const double pure = square[0] * square[0] * sup(0) + square[1] * square[1] * sup(1) +
                       square[2] * square[2] * sup(2),
                mixed = square[0] * square[1] * sup(3) + square[0] * square[2] * sup(4) +
                        square[1] * square[2] * sup(5);
-  return round_up(0.125 * (5.0 / 24 * pure + 2.0 / 8 * mixed));
+  return 0.125 * (5.0 / 24 * pure + 2.0 / 8 * mixed);
 }
 
 }  // namespace vdvr

@@ -21,9 +21,10 @@ namespace vdvr {
 /// sum_{i<j} X_ij ], X_ij at least h_i^2 h_j^2 |F_iijj| in the cell and one step around it.
 class BrickRemainder {
  public:
-  /// Of bricks of `grid`, whose rates `kept` has. All but `granularity` is referred to.
+  /// Of bricks of `grid`, whose rates `kept` has; `differences` as Rates has them. The first four are
+  /// referred to.
   BrickRemainder(opencl::State& state, KeptGold& kept, const FilteredScan& scan, const FieldSups& sups,
-                 const Grid& grid, int granularity);
+                 const Grid& grid, int granularity, int differences);
 
   /// Looks at the bricks selected[(z * bricks_y + y) * bricks_x + x] and what their stencils reach, as far as
   /// nobody has. Cost: gold at the rate of the differences, and six of these a node.
@@ -47,6 +48,9 @@ class BrickRemainder {
 
   /// Of cells of gold on `lattice` in a brick that was required.
   [[nodiscard]] float of(std::int64_t brick, const GoldLattice& lattice) const;
+  /// The largest part of it that sixth derivatives make, on bricks of three layers of cone beam: the lowest
+  /// and the highest that are tested, and one between. Cost: a sum over all views for some bricks together.
+  [[nodiscard]] double largest_of_sixth(const GoldLattice& lattice);
 
  private:
   using Maxima = std::array<float, 6>;  // xx, yy, zz, xy, xz, yz
@@ -54,6 +58,7 @@ class BrickRemainder {
   [[nodiscard]] std::int64_t step_of_gold(std::size_t axis) const {
     return std::max<std::int64_t>(1, rates_[axis] / 2);
   }
+  [[nodiscard]] std::array<int, 3> phases(int differences) const;
   void set_parallel(const FilteredScan& scan, const FieldSups& sups);
   void set_cone();
   void add_sixth(const std::vector<std::uint8_t>& selected);
@@ -64,6 +69,8 @@ class BrickRemainder {
   [[nodiscard]] std::vector<GoldBox> boxes(std::span<const Block> blocks) const;
   [[nodiscard]] static std::uint64_t room_for(const GoldBox& box);
   [[nodiscard]] opencl::DeviceArray<float> launch(const Block& block, opencl::DeviceArray<float>& gold);
+  template <class Sup>
+  [[nodiscard]] double sum_of(const GoldLattice& lattice, Sup&& sup) const;
   template <class Visit>
   void for_each_block(Visit&& visit) const;
   template <class Visit>

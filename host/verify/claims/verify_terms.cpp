@@ -246,6 +246,7 @@ class Totals {
   static GoldSettings settings(const Filtered& f, const MixedVolume& v, const Certificate& c) {
     GoldSettings s{v.grid, v.granularity, v.rate, c.rates.upsampling, c.rates.interpolation, c.window};
     s.coarsening = v.coarsening;
+    s.differences = c.rates.differences;
     // As build's: what kept nodes are charged depends on how far they reach.
     if (f.is_cone()) s.least_reach = reach_of_all(s);
     return s;

@@ -29,10 +29,14 @@ constexpr bool needs_values_alone(Interpolation interpolation) {
   return interpolation == Interpolation::six_taps || interpolation == Interpolation::eight_taps;
 }
 
+constexpr int dense_differences = 8, sparse_differences = 4;
+
 struct Rates {
   int upsampling = 8;  ///< of the filtered projections, in u: a power of two, of cone beam 6
   Interpolation interpolation = Interpolation::linear;
   int gold = 8;  ///< gold samples per cell of the grid and axis; a power of two
+  /// Of cone beam, nodes to a pixel at which fourth differences are taken: 8, or 4 where that does.
+  int differences = dense_differences;
   bool operator==(const Rates&) const = default;
 };
 
