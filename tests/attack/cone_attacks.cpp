@@ -57,8 +57,8 @@ std::string text_of(const Vec3& p) {
 // What a reader needs to know of a case; the seed alone makes it again.
 std::string text_of(const ConeCase& c) {
   return text_of(c.half_angle_deg) + " degrees, " + c.orbit + "; " + c.field + "; target: " + c.place + ", " +
-         text_of(c.target) + "; gold " + std::to_string(c.rates.gold) + ", cells of " + text_of(c.cells) +
-         " pixels";
+         text_of(c.target) + "; gold " + std::to_string(c.rates.gold) + ", differences " +
+         std::to_string(c.rates.differences) + ", cells of " + text_of(c.cells) + " pixels";
 }
 
 // F at the half lattice of all gold cells, x fastest.

@@ -429,6 +429,8 @@ inline ConeCase draw_cone_case(std::uint64_t seed) {
   c.rates = {6, Interpolation::eight_taps, draw.of(gold)};
   c.cells = draw.of(cells);
   c.grid = draw_grid(c.scan.geometry, c.target, c.rates, c.cells, draw);
+  constexpr std::array<int, 2> differences{dense_differences, sparse_differences};
+  c.rates.differences = draw.of(differences);
   return c;
 }
 

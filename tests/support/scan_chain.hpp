@@ -63,8 +63,7 @@ struct GoldNodes {
 
 /// Streams the grid in bricks of one base cell, whose remainders are the sharpest.
 inline GoldNodes stream_nodes(ScanChain& chain, const Grid& grid, const Rates& rates) {
-  GoldStream stream(chain.device.state(), chain.filtered, chain.sups,
-                    {grid, 1, rates.gold, rates.upsampling, rates.interpolation, {}});
+  GoldStream stream(chain.device.state(), chain.filtered, chain.sups, gold_settings(grid, 1, rates));
   GoldNodes out;
   out.grid = grid;
   out.rate = rates.gold;
