@@ -24,6 +24,15 @@ void explain_interruption(std::function<std::string()> message);
 /// Writes to stderr. That nobody reads it is no reason to stop.
 void say(const std::string& text);
 
+/// Times a step under a name.
+template <class Step>
+auto timed(std::map<std::string, double>& seconds, const std::string& name, Step&& step) {
+  const auto start = std::chrono::steady_clock::now();
+  auto result = step();
+  seconds[name] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return result;
+}
+
 class ProgressLine {
  public:
   ProgressLine(std::string who, bool quiet);

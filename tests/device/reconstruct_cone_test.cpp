@@ -4,8 +4,12 @@
 
 #include <boost/test/unit_test.hpp>
 
+#include <complex>
+#include <random>
+
 #include "host/field/fbp/cosine_series.hpp"
 #include "host/field/fdk/cone_back_project.hpp"
+#include "host/field/fdk/cone_points.hpp"
 #include "host/field/fdk/filter_cone.hpp"
 #include "tests/reference/fdk.hpp"
 #include "tests/support/cone_scans.hpp"
@@ -71,7 +75,89 @@ double slope_of_series(const FilteredScan& filtered) {
   return pi * cosine_gain(filtered.geometry.columns) * cosine_gain(filtered.geometry.rows);
 }
 
+// The sum of the amplitudes of a filtered view's waves, which are products of cosines.
+double amplitudes(const FilteredScan& scan, std::int64_t view) {
+  const std::int64_t U = scan.geometry.columns, V = scan.geometry.rows;
+  double sum = 0;
+  for (std::int64_t m = 0; m < U; ++m)
+    for (std::int64_t l = 0; l < V; ++l) {
+      double a = 0;
+      for (std::int64_t u = 0; u < U; ++u)
+        for (std::int64_t v = 0; v < V; ++v)
+          a +=
+              static_cast<double>(scan.samples[static_cast<std::size_t>((view * U + u) * V + v)]) *
+              std::cos(pi * static_cast<double>(m) * (static_cast<double>(u) + 0.5) /
+                       static_cast<double>(U)) *
+              std::cos(pi * static_cast<double>(l) * (static_cast<double>(v) + 0.5) / static_cast<double>(V));
+      sum += std::abs(a) * (m > 0 ? 2 : 1) * (l > 0 ? 2 : 1) / static_cast<double>(U * V);
+    }
+  return sum;
+}
+
+// What 16 taps of 256 places, and linear between them, make of waves up to pi / 2 an entry.
+struct PointTaps {
+  double error = 0, gain = 0;
+};
+PointTaps taps_at_points() {
+  PointTaps out;
+  for (int i = 0; i < 256; ++i) {
+    const auto low = taps_between_half_columns(i / 256.0, 16),
+               high = taps_between_half_columns((i + 1) / 256.0, 16);
+    for (const double part : {0.0, 0.25, 0.5, 0.75}) {
+      double gain = 0;
+      for (std::size_t t = 0; t < low.size(); ++t) gain += std::abs((1 - part) * low[t] + part * high[t]);
+      out.gain = std::max(out.gain, gain);
+      for (double w = 0; w <= pi / 2; w += pi / 128) {
+        std::complex<double> sum = 0;
+        for (std::size_t t = 0; t < low.size(); ++t)
+          sum += ((1 - part) * low[t] + part * high[t]) * std::polar(1.0, w * (static_cast<double>(t) - 7));
+        out.error = std::max(out.error, std::abs(sum - std::polar(1.0, w * (i + part) / 256)));
+      }
+    }
+  }
+  return out;
+}
+
 }  // namespace
+
+BOOST_AUTO_TEST_CASE(points_anywhere_have_the_field) {
+  const PointTaps taps = taps_at_points();
+  BOOST_TEST(taps.error < 1e-4);
+  ConeShape plain, few_rows, leaning, displaced;
+  few_rows.rows = 9;
+  leaning.in_plane_deg = 2;
+  leaning.out_of_plane_deg = -3;
+  leaning.arc_deg = 260;
+  displaced.shift = 4;
+  displaced.rows = 33;
+  for (const ConeShape& shape : {plain, few_rows, leaning, displaced}) {
+    const ProjectionSet scan = noisy_cone(shape);
+    const ExactField exact(scan, {});
+    Device device;
+    const FilteredScan filtered = filter_cone(device.state(), scan, {});
+    std::vector<Vec3> points;
+    std::mt19937 random(7);
+    std::uniform_real_distribution<double> across(-12, 12), along(-12, 12);
+    for (int i = 0; i < 4000; ++i)
+      if (const Vec3 p{across(random), across(random), along(random)}; exact.covered(p)) points.push_back(p);
+    BOOST_REQUIRE(points.size() > 100u);
+    const std::vector<double> truth = exact.at(points);
+    const std::vector<float> found = cone_at_points(device.state(), ScanInUnits(scan), {}, points, {});
+    const double nearest = 1 - 18 / shape.source_to_axis;
+    double waves = 0;
+    for (std::int64_t k = 0; k < shape.views; ++k) waves += amplitudes(filtered, k) / (nearest * nearest);
+    const double allowed = (1 + taps.gain) * taps.error * waves +
+                           tolerance::fp32_sum(40, taps.gain * taps.gain * waves) +
+                           rounding(filtered, nearest, slope_of_series(filtered));
+    double worst = 0, largest = 0;
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+      worst = std::max(worst, std::abs(static_cast<double>(found[i]) - truth[i]));
+      largest = std::max(largest, std::abs(truth[i]));
+    }
+    BOOST_TEST(worst <= allowed);
+    BOOST_TEST(worst < 1e-3 * largest);
+  }
+}
 
 BOOST_AUTO_TEST_CASE(fdk_is_what_its_formulas_say) {
   for (const double distance : {40.0, 90.0, 400.0}) {
@@ -170,11 +256,9 @@ BOOST_AUTO_TEST_CASE(vectors_of_any_length_give_the_same) {
     const FilteredScan filtered = filter_cone(state, scan, {});
     const Grid grid = make_grid(scan, {});
     const Index3 n = grid.samples();
-    Upsampler upsampler(state, filtered);
     std::vector<std::vector<float>> results;
     for (const int rate : {1, 2}) {
-      const ConeTable table =
-          cone_table(state, filtered, upsampler, rate, {1, -1, shape.rows}, 0, shape.views);
+      const ConeTable table = ConeTables(state, filtered, rate, {1, -1, shape.rows})(0, shape.views);
       const ConeBand band{&grid,
                           0,
                           n[1],

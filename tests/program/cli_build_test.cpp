@@ -3,6 +3,7 @@
 #define BOOST_TEST_MODULE cli_build
 #include <boost/test/unit_test.hpp>
 
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -118,12 +119,20 @@ BOOST_AUTO_TEST_CASE(a_region_of_interest_without_a_size_is_all_that_is_planned_
     return nlohmann::json::parse(r.out);
   };
   const auto whole = json_of({"plan", small_scan(), "--epsilon", "20%", "--json"}),
-             part = json_of({"plan", small_scan(), "--epsilon", "20%", box, "--json"}),
-             built = json_of({"build", small_scan(), "--epsilon", "20%", box, "-o", file, "--json"});
+             part = json_of({"plan", small_scan(), "--epsilon", "20%", box, "--json"});
+  const auto start = std::chrono::steady_clock::now();
+  const auto built = json_of({"build", small_scan(), "--epsilon", "20%", box, "-o", file, "--json"});
+  const double seconds_of_build =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   BOOST_TEST(part["grid"]["cells"][0].get<int>() < whole["grid"]["cells"][0].get<int>());
   BOOST_TEST(part["grid"] == built["grid"]);
   BOOST_TEST(part["notes"].dump().find("`roi`") != std::string::npos);
   BOOST_TEST(built["certificate"]["roi"].size() == 6u);
+  // Of all that the command did, not of its stages after the plan alone.
+  double sum = 0;
+  for (const auto& [stage, seconds] : built["seconds"].items()) sum += seconds.get<double>();
+  BOOST_TEST(built["seconds"]["plan"].get<double>() > 0);
+  BOOST_TEST(sum <= seconds_of_build);
   BOOST_TEST(run({"verify", file, "--projections", small_scan(), "--exhaustive"}).code == 0);
   check_refused({"plan", small_scan(), "--epsilon", "20%", box, "--size", "8x8x8"}, "--size");
   check_refused({"plan", small_scan(), "--epsilon", "20%", "--roi=90,0,0,91,1,1"}, "meets no brick");

@@ -4,7 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <string>
 
 #include "apps/common/progress.hpp"
 #include "apps/vdvr/certify.hpp"
@@ -21,8 +23,11 @@ int build_file(const Arguments& args, const CommonOptions& common, Wanted wanted
   Device& device = devices.first();
   wanted.options.build.crew = devices.crew();
   ProgressLine progress(args.who(), common.quiet);
-  Planned planned = read_and_plan(device, args, wanted, progress.callback());
+  std::map<std::string, double> seconds;
+  Planned planned =
+      timed(seconds, "plan", [&] { return read_and_plan(device, args, wanted, progress.callback()); });
   const BuildResult result = build_planned(device, planned, wanted, progress.callback());
+  seconds.insert(result.seconds.begin(), result.seconds.end());
   throw_if_stopped();
   write_vdvr(output, result.volume, result.certificate, wanted.compression);
   journals.remove();
@@ -38,14 +43,14 @@ int build_file(const Arguments& args, const CommonOptions& common, Wanted wanted
                      {"messages", {{"bytes", result.message_bytes}, {"seconds", result.message_seconds}}},
                      {"pictures", pictures_json(planned)},
                      {record_name(result.certificate), certificate_json(result.certificate)},
-                     {"seconds", seconds_json(result.seconds)}};
+                     {"seconds", seconds_json(seconds)}};
   print_result(common, json, [&] {
     print_scan(planned.scan);
     print_grid(result.volume.grid);
     print_certificate(result.certificate);
     print_pictures(planned);
     print_storage(result.volume, bytes);
-    print_seconds(result.seconds);
+    print_seconds(seconds);
     fmt::print("written        {}\n", output.string());
   });
   return std::max(pictures_exit_code(args.who(), planned),

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <fstream>
 #include <iterator>
@@ -40,15 +39,6 @@ struct Outcome {
   std::map<std::string, std::string> outside;              ///< of a picture: what no certificate covers
   std::map<std::string, double> seconds;
 };
-
-/// Times a step under a name, in the order of the steps.
-template <class Step>
-auto timed(std::map<std::string, double>& seconds, const std::string& name, Step&& step) {
-  const auto start = std::chrono::steady_clock::now();
-  auto result = step();
-  seconds[name] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  return result;
-}
 
 std::vector<std::string> file_names() {
   return {"volume.vdvr",    "dvr.png",     "bound.png",       "iso.png",   "slice-x.png",

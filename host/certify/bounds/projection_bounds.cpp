@@ -18,8 +18,9 @@
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
 #include "host/certify/bounds/column_taps.hpp"
-#include "host/certify/bounds/dense_values.hpp"
+#include "host/certify/bounds/dense_rounding.hpp"
 #include "host/certify/bounds/node_functional.hpp"
+#include "host/field/fbp/dense_values.hpp"
 #include "host/field/fdk/region_parts.hpp"
 #include "vdvr/error.hpp"
 

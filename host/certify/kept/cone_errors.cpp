@@ -8,6 +8,7 @@
 #include "host/base/system/casts.hpp"
 #include "host/base/system/parallel.hpp"
 #include "host/certify/bounds/column_taps.hpp"
+#include "host/certify/bounds/dense_rounding.hpp"
 #include "host/certify/kept/cone_tiles.hpp"
 #include "host/field/fbp/back_project.hpp"
 

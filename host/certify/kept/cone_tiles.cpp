@@ -320,10 +320,11 @@ ConeTiles::Table ConeTiles::dense_table(std::int64_t first, std::int64_t views) 
             views};
   if (dense_) {
     const opencl::DeviceArray<float>& values = (*dense_)(first, views);
-    opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int> join(
-        state_, "certify/kept/join_columns", "join_columns");
+    opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int> join(
+        state_, "field/fdk/join_columns", "join_columns", {{"VDVR_RATE", "1"}});
     join({{count(stride), count(columns_.count), count(views)}, {16, 1, 1}}, out.values.buffer(),
-         values.buffer(), to_int(views), to_int(columns_.count), to_int(rows_.count), to_int(stride));
+         values.buffer(), to_int(views), to_int(columns_.count), to_int(rows_.count), 0, to_int(rows_.count),
+         to_int(stride));
     return out;
   }
   std::vector<double> rows;

@@ -14,12 +14,12 @@
 #include <vector>
 
 #include "host/base/opencl/kernel.hpp"
-#include "host/certify/bounds/dense_values.hpp"
 #include "host/certify/bounds/projection_bounds.hpp"
 #include "host/certify/kept/gold_filters.hpp"
 #include "host/certify/kept/projective_error.hpp"
 #include "host/certify/kept/upright_views.hpp"
 #include "host/field/fbp/coverage.hpp"
+#include "host/field/fbp/dense_values.hpp"
 #include "shared/cone_nodes.h"
 #include "vdvr/error.hpp"
 #include "vdvr/expert/grid.hpp"

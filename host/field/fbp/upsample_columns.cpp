@@ -83,17 +83,16 @@ double bessel(double x) {
 
 }  // namespace
 
-std::vector<double> taps_between_half_columns(double place) {
+std::vector<double> taps_between_half_columns(double place, int taps) {
   // The window's main lobe ends pi / 2 a node off.
-  constexpr double half = half_column_taps / 2.0;
-  const double beta = std::sqrt(std::pow(half * pi / 2, 2) - pi * pi);
-  std::vector<double> taps;
-  for (int n = 1 - half_column_taps / 2; n <= half_column_taps / 2; ++n) {
+  const double half = taps / 2.0, beta = std::sqrt(std::pow(half * pi / 2, 2) - pi * pi);
+  std::vector<double> out;
+  for (int n = 1 - taps / 2; n <= taps / 2; ++n) {
     const double d = n - place, r = d / half;
     const double sinc = d == 0 ? 1 : std::sin(pi * d) / (pi * d);
-    taps.push_back(sinc * bessel(beta * std::sqrt(std::max(0.0, 1 - r * r))) / bessel(beta));
+    out.push_back(sinc * bessel(beta * std::sqrt(std::max(0.0, 1 - r * r))) / bessel(beta));
   }
-  return taps;
+  return out;
 }
 
 double half_column_error(std::int64_t columns) {
@@ -141,8 +140,10 @@ void ColumnUpsampling::operator()(const opencl::DeviceArray<float>& out, const V
   const std::uint64_t tasks = count(views * chunks) * 8 / lanes;
   std::uint64_t slots = std::min(tasks, std::uint64_t{state_.info.compute_units} * (lanes == 1 ? 128 : 4));
   slots = opencl::round_up(std::clamp<std::uint64_t>(most_scratch / (8 * slot), 1, slots), width);
-  // A slot more or less changes no value, and a GPU may allow little in one piece.
-  while (slots > width && 8 * slots * slot > state_.info.max_allocation) slots -= width;
+  // A slot more or less changes no value; a GPU may allow little in one piece, and --max-memory in all.
+  const std::uint64_t most =
+      std::min(state_.info.max_allocation, state_.memory.left() / 4 + 8 * scratch_.size());
+  while (slots > width && 8 * slots * slot > most) slots -= width;
   if (scratch_.size() < slots * slot) {
     scratch_ = {};  // before the next one is allocated
     scratch_ = opencl::DeviceArray<double>(state_, slots * slot, "rows between columns");

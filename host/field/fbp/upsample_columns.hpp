@@ -12,10 +12,10 @@
 namespace vdvr {
 
 /// Taps on half columns (detector columns and the values half-way between) around a place between two of
-/// them; the nodes are 1 - half_column_taps / 2 .. half_column_taps / 2, the place lies between 0 and 1.
+/// them; the nodes are 1 - taps / 2 .. taps / 2, the place lies between 0 and 1.
 constexpr int half_column_taps = 32;
 /// A sinc in a Kaiser window: frequencies up to pi / 2 a node pass, those above 3 pi / 2 do not.
-std::vector<double> taps_between_half_columns(double place);
+std::vector<double> taps_between_half_columns(double place, int taps = half_column_taps);
 
 /// What the transforms err: a value half-way between columns is this times the largest norm of a row of its
 /// view off, before it is used; that of a detector column is exact.

@@ -26,6 +26,8 @@ constexpr std::int64_t rows_of_vectors = longest_vector + most_spans + 4;
 // Alike of a single lane, which reads two.
 constexpr std::int64_t rows_of_lane = 2;
 constexpr int views_together = 8;
+// Of the detector, from which on tables are made by transforms along v.
+constexpr std::int64_t fewest_rows = 16;
 // Of fewer planes most lanes would be idle.
 constexpr std::int64_t fewest_planes = 4;
 
@@ -34,19 +36,6 @@ std::int64_t rows_around(const ConeReach& reach) { return reach.vectors ? rows_o
 std::int64_t mirrored(std::int64_t i, std::int64_t n) {
   const std::int64_t period = 2 * n, m = ((i % period) + period) % period;
   return m < n ? m : period - 1 - m;
-}
-
-struct TableShape {
-  UpsampledColumns columns;
-  std::int64_t rows, row_stride;
-};
-
-TableShape shape_of(const FilteredScan& scan, int rate, const ConeReach& reach) {
-  TableShape s{upsampled_columns(scan.geometry.columns, rate, static_cast<double>(reach.columns)),
-               (reach.last_row - reach.first_row + 2 * rows_around(reach)) * rate + 1, 0};
-  // Of each phase; vectors read past the last row.
-  s.row_stride = rate * column_stride((s.rows + rate - 1) / rate + longest_vector);
-  return s;
 }
 
 // Values straight from the detector's own pixels.
@@ -68,21 +57,6 @@ void copy_pixels(const FilteredScan& scan, ConeTable& table) {
       }
     });
   });
-}
-
-// Upsampled values, from chunks of 16 rows to whole columns.
-void copy_upsampled(opencl::State& state, Upsampler& upsampler, const UpsampledColumns& columns,
-                    ConeTable& table) {
-  std::vector<double> rows(at(table.rows));
-  for (std::size_t r = 0; r < rows.size(); ++r)
-    rows[r] = table.first_row + static_cast<double>(r) / table.rate;
-  const UpsampledSlab slab = upsampler(columns, rows, 0, 0, table.rate, table.first_view, table.views);
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int> kernel(
-      state, "field/fdk/join_rows", "join_rows", {{"VDVR_RATE", std::to_string(table.rate)}});
-  const std::int64_t all = table.views * table.columns, of_phase = table.row_stride / table.rate;
-  kernel({{count(of_phase), count(table.rate), count(all)}, {16, 1, 1}}, table.values.buffer(),
-         slab.values.buffer(), to_int(all), to_int(table.rows), to_int(of_phase));
-  opencl::finish(state, "upsampled rows");  // before the slab goes
 }
 
 // Of a view about the middle of a block of columns.
@@ -182,30 +156,66 @@ bool planes_suit_vectors(const FilteredScan& scan, const Grid& grid) {
   });
 }
 
-std::uint64_t cone_table_bytes(const FilteredScan& scan, int rate, const ConeReach& reach,
-                               std::int64_t views) {
-  const TableShape s = shape_of(scan, rate, reach);
-  return sizeof(float) * count(views) * count(s.columns.count) * count(s.row_stride);
+ConeTables::ConeTables(opencl::State& state, const FilteredScan& scan, int rate, const ConeReach& reach)
+    : state_(state),
+      scan_(scan),
+      rate_(rate),
+      vectors_(reach.vectors),
+      columns_(upsampled_columns(scan.geometry.columns, rate, static_cast<double>(reach.columns))),
+      first_row_(reach.first_row - rows_around(reach)),
+      rows_((reach.last_row - reach.first_row + 2 * rows_around(reach)) * rate + 1),
+      // Of each phase; vectors read past the last row.
+      row_stride_(rate * column_stride((rows_ + rate - 1) / rate + longest_vector)),
+      upsampler_(state, scan, ColumnMethod::accurate) {
+  const std::int64_t V = scan.geometry.rows, last_row = reach.last_row + rows_around(reach),
+                     beyond = std::max({std::int64_t{0}, -first_row_, last_row - V + 1});
+  if (rate > 1 && 2 * (reach.last_row - reach.first_row) >= V &&
+      DenseValues::suit(state, scan.geometry, fewest_rows))
+    dense_.emplace(state, upsampler_, scan, columns_,
+                   upsampled_columns(V, rate, static_cast<double>(beyond)));
 }
 
-ConeTable cone_table(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, int rate,
-                     const ConeReach& reach, std::int64_t first, std::int64_t views) {
-  const TableShape s = shape_of(scan, rate, reach);
-  ConeTable table{{},
-                  rate,
-                  s.columns.count,
-                  s.rows,
-                  s.row_stride,
-                  s.columns.position(0),
-                  static_cast<double>(reach.first_row - rows_around(reach)),
-                  first,
-                  views,
-                  reach.vectors};
+std::uint64_t ConeTables::bytes(std::int64_t views) const {
+  const std::uint64_t table = sizeof(float) * count(views * columns_.count * row_stride_);
+  if (rate_ == 1) return table;
+  return table + (dense_ ? dense_->bytes(views) : table);
+}
+
+ConeTable ConeTables::operator()(std::int64_t first, std::int64_t views) {
+  ConeTable table{
+      {},    rate_, columns_.count, rows_, row_stride_, columns_.position(0), static_cast<double>(first_row_),
+      first, views, vectors_};
   table.values =
-      opencl::DeviceArray<float>(state, count(views * s.columns.count * s.row_stride), "filtered views");
-  if (rate == 1) copy_pixels(scan, table);
-  else copy_upsampled(state, upsampler, s.columns, table);
+      opencl::DeviceArray<float>(state_, count(views * columns_.count * row_stride_), "filtered views");
+  if (rate_ == 1) copy_pixels(scan_, table);
+  else if (dense_) join_dense(table);
+  else upsample(table);
   return table;
+}
+
+// From chunks of 16 columns to whole ones.
+void ConeTables::join_dense(ConeTable& table) {
+  const opencl::DeviceArray<float>& values = (*dense_)(table.first_view, table.views);
+  const std::int64_t of_phase = row_stride_ / rate_;
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int> kernel(
+      state_, "field/fdk/join_columns", "join_columns", {{"VDVR_RATE", std::to_string(rate_)}});
+  const auto first = std::llround(dense_->rows().column_of(table.first_row));
+  kernel({{count(of_phase), count(columns_.count * rate_), count(table.views)}, {16, 1, 1}},
+         table.values.buffer(), values.buffer(), to_int(table.views), to_int(columns_.count),
+         to_int(dense_->rows().count), to_int(first), to_int(rows_), to_int(of_phase));
+}
+
+// From chunks of 16 rows to whole columns.
+void ConeTables::upsample(ConeTable& table) {
+  std::vector<double> rows(at(rows_));
+  for (std::size_t r = 0; r < rows.size(); ++r) rows[r] = table.first_row + static_cast<double>(r) / rate_;
+  const UpsampledSlab slab = upsampler_(columns_, rows, 0, 0, rate_, table.first_view, table.views);
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int> kernel(
+      state_, "field/fdk/join_rows", "join_rows", {{"VDVR_RATE", std::to_string(rate_)}});
+  const std::int64_t all = table.views * columns_.count, of_phase = row_stride_ / rate_;
+  kernel({{count(of_phase), count(rate_), count(all)}, {16, 1, 1}}, table.values.buffer(),
+         slab.values.buffer(), to_int(all), to_int(rows_), to_int(of_phase));
+  opencl::finish(state_, "upsampled rows");  // before the slab goes
 }
 
 void cone_back_project(opencl::State& state, const FilteredScan& scan, const ConeTable& table,

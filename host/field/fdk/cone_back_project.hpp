@@ -2,8 +2,10 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <vector>
 
+#include "host/field/fbp/dense_values.hpp"
 #include "host/field/fbp/filter_projections.hpp"
 #include "vdvr/expert/grid.hpp"
 
@@ -30,11 +32,29 @@ struct ConeReach {
 /// Whether vectors of planes pay: there are enough of them, and rows of the detector lie about as far apart.
 bool planes_suit_vectors(const FilteredScan& scan, const Grid& grid);
 
-/// Views [first, first + count). Cost: rate 1: a copy; else as Upsampler's. `upsampler`: of the same scan.
-ConeTable cone_table(opencl::State& state, const FilteredScan& scan, Upsampler& upsampler, int rate,
-                     const ConeReach& reach, std::int64_t first, std::int64_t count);
-std::uint64_t cone_table_bytes(const FilteredScan& scan, int rate, const ConeReach& reach,
-                               std::int64_t views);
+/// Makes tables of a scan's views. Refers to the state and the scan.
+class ConeTables {
+ public:
+  ConeTables(opencl::State& state, const FilteredScan& scan, int rate, const ConeReach& reach);
+  /// Views [first, first + count). Cost: rate 1: a copy; else transforms of all rows and columns where the
+  /// device has double precision and the table most of the detector's rows, or as Upsampler's.
+  ConeTable operator()(std::int64_t first, std::int64_t views);
+  /// Of a table, and of what it is made of on the way.
+  [[nodiscard]] std::uint64_t bytes(std::int64_t views) const;
+
+ private:
+  void upsample(ConeTable& table);
+  void join_dense(ConeTable& table);
+
+  opencl::State& state_;
+  const FilteredScan& scan_;
+  int rate_;
+  bool vectors_;
+  UpsampledColumns columns_;
+  std::int64_t first_row_ = 0, rows_ = 0, row_stride_ = 0;
+  Upsampler upsampler_;
+  std::optional<DenseValues> dense_;
+};
 
 /// Samples of `grid` with x, all rows from `first_y` and planes from `first_z`.
 struct ConeBand {

@@ -127,7 +127,7 @@ struct Sizes {
 constexpr std::uint64_t enough_bytes = std::uint64_t{128} << 20;
 
 // A slab's planes and a band's columns take a quarter of what is left each, views another.
-Sizes sizes_for(const opencl::State& state, const FilteredScan& scan, int rate, const ConeReach& reach,
+Sizes sizes_for(const opencl::State& state, const FilteredScan& scan, int rate, const ConeTables& tables,
                 const Index3& n, std::uint64_t plane_bytes) {
   const std::uint64_t share = std::min(state.memory.left() / 4, state.info.max_allocation);
   Sizes s{};
@@ -139,8 +139,7 @@ Sizes sizes_for(const opencl::State& state, const FilteredScan& scan, int rate, 
   s.planes = std::min(s.planes, std::int64_t{1024});
   s.band = most(sizeof(float) * count(n[0] * column_stride(std::max<std::int64_t>(s.planes, 1))), n[1]);
   if (s.band > VDVR_CONE_BLOCK && s.band < n[1]) s.band = s.band / VDVR_CONE_BLOCK * VDVR_CONE_BLOCK;
-  // Upsampled views pass through a slab of their own.
-  const std::uint64_t per_view = cone_table_bytes(scan, rate, reach, 1) * (rate == 1 ? 1 : 2);
+  const std::uint64_t per_view = tables.bytes(1);
   s.views = most(per_view, scan.geometry.views());
   // Where no table is made twice, small ones do: they are no faster for being large.
   if (s.planes == n[2] && s.band == n[1])
@@ -175,10 +174,10 @@ void back_project_views(opencl::State& state, const FilteredScan& filtered, cons
   const ConeCoverage coverage(filtered.views, g.columns, g.rows);
   const ConeReach reach = reach_of(filtered, coverage, grid);
   const Index3 n = grid.samples();
-  const Sizes sizes = sizes_for(state, filtered, rate, reach, n, planes.bytes);
+  ConeTables tables(state, filtered, rate, reach);
+  const Sizes sizes = sizes_for(state, filtered, rate, tables, n, planes.bytes);
   HostMemory host(state);
   host.count(filtered.samples.resident_bytes(), "the filtered projections");
-  Upsampler upsampler(state, filtered);
   bool any = false;
   std::optional<ConeTable> table;  // the last one: of all views it serves all bands
   for (std::int64_t z0 = 0; z0 < n[2]; z0 += sizes.planes) {
@@ -200,7 +199,7 @@ void back_project_views(opencl::State& state, const FilteredScan& filtered, cons
         const std::int64_t views = std::min(sizes.views, g.views() - first);
         if (!table || table->first_view != first || table->views != views) {
           table.reset();
-          table = cone_table(state, filtered, upsampler, rate, reach, first, views);
+          table = tables(first, views);
           watch.lap(state, "upsample");
         }
         band.adds = first > 0;

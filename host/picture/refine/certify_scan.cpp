@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <chrono>
 #include <utility>
 
 #include "vdvr/error.hpp"
@@ -86,8 +87,11 @@ BuildResult certify_planned(Device& device, const ProjectionSet& scan, PlannedSc
   if (auto refinement = refinement_of(planned)) options.build.refinement = std::move(*refinement);
   BuildResult built = certify(device, scan, std::move(planned.plan), options, progress);
   if (planned.pictures) planned.pictures->note(built.certificate);
-  if (planned.sigma)
+  if (planned.sigma) {
+    const auto start = std::chrono::steady_clock::now();
     note_noise(device, scan, built, *planned.noise, *planned.sigma, planned.asked.sigmas, progress);
+    built.seconds["noise"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  }
   return built;
 }
 

@@ -68,7 +68,7 @@ struct MeanError {
   std::int64_t points = 0;
 };
 /// Of a certificate with its `brick_sigma`. Nothing where fewer than a hundred points are covered. Cost: a
-/// reconstruction of some ten thousand samples. Throws what reconstruct() throws.
+/// reconstruction at some ten thousand points. Throws what reconstruct() throws.
 VDVR_API std::optional<MeanError> mean_error(Device& device, const ProjectionSet& scan,
                                              const MixedVolume& volume, const Certificate& certificate,
                                              const Progress& progress = {});

@@ -2,7 +2,6 @@
 // transforms as well, so that each value errs by some u of the largest.
 #pragma once
 
-#include "host/certify/bounds/projection_bounds.hpp"
 #include "host/field/fbp/filter_projections.hpp"
 
 namespace vdvr {
@@ -37,10 +36,5 @@ class DenseValues {
   std::vector<double> own_rows_;
   opencl::DeviceArray<float> turned_, values_;
 };
-
-/// What such values err, of views whose samples sum up to `samples` and whose sups, on the detector's rows,
-/// to `sup`: columns by a part of their own, which the series along v makes grow, and rows by theirs.
-double dense_rounding(Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns,
-                      const UpsampledColumns& rows, double samples, double sup, Fp64 fp64 = Fp64::as_here);
 
 }  // namespace vdvr

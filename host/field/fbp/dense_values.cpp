@@ -1,5 +1,5 @@
-// Launches `turn` of kernels/certify/bounds/projection_bounds.cl between two passes of upsample_columns.cpp.
-#include "host/certify/bounds/dense_values.hpp"
+// Launches kernels/field/fbp/turn.cl between two passes of upsample_columns.cpp.
+#include "host/field/fbp/dense_values.hpp"
 
 #include "host/base/opencl/work_groups.hpp"
 #include "host/base/system/casts.hpp"
@@ -31,8 +31,7 @@ const opencl::DeviceArray<float>& DenseValues::operator()(std::int64_t first, st
   const UpsampledSlab slab = upsampler_(columns_, own_rows_, 0, 0, 1, first, views);
   resize(turned_, count(chunks() * views * V * 16), "columns of rows");
   resize(values_, count(chunks() * views * rows_.count * 16), "dense values");
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int> turn(
-      state_, "certify/bounds/projection_bounds", "turn");
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int> turn(state_, "field/fbp/turn", "turn");
   turn(opencl::in_groups(state_.info, {count(V), count(chunks()), count(views)}), turned_.buffer(),
        slab.values.buffer(), to_int(views), to_int(columns_.count), to_int(V));
   along_v_(values_, {0, count(rows_.count * 16), count(views * rows_.count * 16)}, turned_,
@@ -45,16 +44,6 @@ void DenseValues::resize(opencl::DeviceArray<float>& array, std::uint64_t size, 
   if (array.size() == size) return;
   array = {};  // before the next one is allocated
   array = opencl::DeviceArray<float>(state_, size, what);
-}
-
-double dense_rounding(Upsampler& upsampler, const FilteredScan& scan, const UpsampledColumns& columns,
-                      const UpsampledColumns& rows, double samples, double sup, Fp64 fp64) {
-  const ParallelGeometry& g = scan.geometry;
-  const double gain_v = lebesgue_constant(g.rows);
-  const double of_columns = column_error(upsampler, g.columns, columns, samples, sup, fp64),
-               largest = sup + of_columns;
-  return gain_v * of_columns + transform_error(g.rows, rows.rate, largest, gain_v * largest) +
-         static_cast<double>(g.views()) * gain_v * product_underflow(g, upsampler.gain_u());
 }
 
 }  // namespace vdvr
