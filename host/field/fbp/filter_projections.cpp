@@ -19,8 +19,9 @@
 namespace vdvr {
 namespace {
 
-// Products of more columns take longer than transforms; they are the less exact anyway.
-constexpr std::int64_t fast_product_columns = 768;
+// Products of more columns take longer than transforms; they are the less exact anyway. Cards may have few
+// units of double precision.
+constexpr std::int64_t fast_product_columns = 128, fast_product_columns_of_cards = 768;
 
 // The detector row or column at which a position lies, mirrored about the outer edges; -1 where it lies
 // between two. A position is taken for a whole one when it misses it by no more than its own rounding.
@@ -232,7 +233,9 @@ const Upsampler::Matrix& Upsampler::matrix_u(const UpsampledColumns& columns, in
 }
 
 bool Upsampler::transforms(const UpsampledColumns& columns) const {
-  const bool wanted = method_ == ColumnMethod::accurate || scan_->geometry.columns > fast_product_columns;
+  const std::int64_t most =
+      column_tuning(state_->info).lanes > 1 ? fast_product_columns : fast_product_columns_of_cards;
+  const bool wanted = method_ == ColumnMethod::accurate || scan_->geometry.columns > most;
   return wanted && columns.rate % 2 == 0 && ColumnUpsampling::is_possible(*state_);
 }
 
