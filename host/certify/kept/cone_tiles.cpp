@@ -319,12 +319,7 @@ ConeTiles::Table ConeTiles::dense_table(std::int64_t first, std::int64_t views) 
   Table out{opencl::DeviceArray<float>(state_, count(views * columns_.count * stride), "dense views"), first,
             views};
   if (dense_) {
-    const opencl::DeviceArray<float>& values = (*dense_)(first, views);
-    opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int> join(
-        state_, "field/fdk/join_columns", "join_columns", {{"VDVR_RATE", "1"}});
-    join({{count(stride), count(columns_.count), count(views)}, {16, 1, 1}}, out.values.buffer(),
-         values.buffer(), to_int(views), to_int(columns_.count), to_int(rows_.count), 0, to_int(rows_.count),
-         to_int(stride));
+    dense_->join(out.values, first, views, {0, rows_.count, 1, stride});
     return out;
   }
   std::vector<double> rows;

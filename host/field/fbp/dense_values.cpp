@@ -1,4 +1,5 @@
-// Launches kernels/field/fbp/turn.cl between two passes of upsample_columns.cpp.
+// Launches kernels/field/fbp/turn.cl between two passes of upsample_columns.cpp, and join_columns.cl after
+// them.
 #include "host/field/fbp/dense_values.hpp"
 
 #include "host/base/opencl/work_groups.hpp"
@@ -38,6 +39,16 @@ const opencl::DeviceArray<float>& DenseValues::operator()(std::int64_t first, st
            {0, count(V * 16), count(views * V * 16)}, rows_, views, chunks());
   opencl::finish(state_, "dense values");  // before the slab goes
   return values_;
+}
+
+void DenseValues::join(const opencl::DeviceArray<float>& out, std::int64_t first, std::int64_t views,
+                       const WholeColumns& wanted) {
+  const opencl::DeviceArray<float>& values = (*this)(first, views);
+  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int> kernel(
+      state_, "field/fbp/join_columns", "join_columns", {{"VDVR_RATE", std::to_string(wanted.phases)}});
+  kernel({{count(wanted.phase_stride), count(columns_.count * wanted.phases), count(views)}, {16, 1, 1}},
+         out.buffer(), values.buffer(), to_int(views), to_int(columns_.count), to_int(rows_.count),
+         to_int(wanted.first), to_int(wanted.rows), to_int(wanted.phase_stride));
 }
 
 void DenseValues::resize(opencl::DeviceArray<float>& array, std::uint64_t size, const char* what) {

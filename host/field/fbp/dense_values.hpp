@@ -21,6 +21,15 @@ class DenseValues {
   const opencl::DeviceArray<float>& operator()(std::int64_t first, std::int64_t views);
   [[nodiscard]] std::uint64_t bytes(std::int64_t views) const;
 
+  /// Which rows of whole columns, and how they lie: `phases` of them to a row of the detector, or all in one.
+  struct WholeColumns {
+    std::int64_t first = 0, rows = 0, phases = 1, phase_stride = 0;
+  };
+  /// The same as float out[view][column][row % phases][row / phases], rows counted from the first wanted one,
+  /// phases `phase_stride` apart, 0 beyond the last. Enqueues only.
+  void join(const opencl::DeviceArray<float>& out, std::int64_t first, std::int64_t views,
+            const WholeColumns& wanted);
+
   [[nodiscard]] const UpsampledColumns& columns() const { return columns_; }
   [[nodiscard]] const UpsampledColumns& rows() const { return rows_; }
 

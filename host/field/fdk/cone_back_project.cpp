@@ -188,21 +188,12 @@ ConeTable ConeTables::operator()(std::int64_t first, std::int64_t views) {
   table.values =
       opencl::DeviceArray<float>(state_, count(views * columns_.count * row_stride_), "filtered views");
   if (rate_ == 1) copy_pixels(scan_, table);
-  else if (dense_) join_dense(table);
+  else if (dense_)
+    dense_->join(
+        table.values, first, views,
+        {std::llround(dense_->rows().column_of(table.first_row)), rows_, rate_, row_stride_ / rate_});
   else upsample(table);
   return table;
-}
-
-// From chunks of 16 columns to whole ones.
-void ConeTables::join_dense(ConeTable& table) {
-  const opencl::DeviceArray<float>& values = (*dense_)(table.first_view, table.views);
-  const std::int64_t of_phase = row_stride_ / rate_;
-  opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int, cl_int, cl_int, cl_int> kernel(
-      state_, "field/fdk/join_columns", "join_columns", {{"VDVR_RATE", std::to_string(rate_)}});
-  const auto first = std::llround(dense_->rows().column_of(table.first_row));
-  kernel({{count(of_phase), count(columns_.count * rate_), count(table.views)}, {16, 1, 1}},
-         table.values.buffer(), values.buffer(), to_int(table.views), to_int(columns_.count),
-         to_int(dense_->rows().count), to_int(first), to_int(rows_), to_int(of_phase));
 }
 
 // From chunks of 16 rows to whole columns.

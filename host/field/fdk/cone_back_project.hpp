@@ -44,7 +44,6 @@ class ConeTables {
 
  private:
   void upsample(ConeTable& table);
-  void join_dense(ConeTable& table);
 
   opencl::State& state_;
   const FilteredScan& scan_;

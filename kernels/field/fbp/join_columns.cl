@@ -1,7 +1,7 @@
 // Values on a lattice denser than the detector as back-projection reads them: float in[column /
 // 16][view][row][16] to float out[view][column][row % VDVR_RATE][row / VDVR_RATE], rows counted from `first`
 // of `in_rows`, phases of rows `phase_stride` apart. What lies beyond the last of `rows` is 0. Called by
-// host/field/fdk/cone_back_project.cpp and host/certify/kept/cone_tiles.cpp.
+// host/field/fbp/dense_values.cpp.
 #ifndef VDVR_RATE
 #error "VDVR_RATE must be set"
 #endif
