@@ -65,7 +65,7 @@ BOOST_AUTO_TEST_CASE(launchers_have_their_own_arguments) {
   Device device;
   opencl::State& state = device.state();
   using Turn = opencl::Kernel<cl::Buffer, cl::Buffer, cl_int, cl_int, cl_int>;
-  const auto launcher = [&] { return Turn(state, "certify/bounds/projection_bounds", "turn"); };
+  const auto launcher = [&] { return Turn(state, "field/fbp/turn", "turn"); };
   const auto square = [](int first) {
     std::vector<float> out(256);
     std::iota(out.begin(), out.end(), static_cast<float>(first));
