@@ -116,11 +116,6 @@ std::optional<MeanError> mean_error(Device& device, const ProjectionSet& scan, c
   }
   if (mean.points < least_points) return std::nullopt;
   mean.in_sigma = std::sqrt(mean.in_sigma / static_cast<double>(mean.points));
-  // Six digits: those that follow depend on how memory divides the reconstruction, and files would differ.
-  if (mean.in_sigma > 0) {
-    const double unit = std::pow(10.0, std::floor(std::log10(mean.in_sigma)) - 5);
-    mean.in_sigma = std::round(mean.in_sigma / unit) * unit;
-  }
   return mean;
 }
 

@@ -168,16 +168,23 @@ void note_noise(Certificate& c, const ScanNoise& noise, const BrickSigma& sigma,
   }
 }
 
+// Those that follow depend on how memory divides a reconstruction, and files would differ.
+static double six_digits(double x) {
+  if (!(x > 0)) return x;
+  const double unit = std::pow(10.0, std::floor(std::log10(x)) - 5);
+  return std::round(x / unit) * unit;
+}
+
 void note_noise(Device& device, const ProjectionSet& scan, BuildResult& built, const ScanNoise& noise,
                 const BrickSigma& sigma, std::optional<double> multiple, const Progress& progress) {
   note_noise(built.certificate, noise, sigma, multiple);
   try {
     if (const auto mean = mean_error(device, scan, built.volume, built.certificate, progress)) {
-      built.certificate.noise->rms_in_sigma = mean->in_sigma;
+      built.certificate.noise->rms_in_sigma = six_digits(mean->in_sigma);
       built.certificate.noise->rms_points = mean->points;
     }
     if (const auto split = split_of_views(device, scan, built.certificate.field, noise.model, progress)) {
-      built.certificate.noise->split_ratio = split->ratio();
+      built.certificate.noise->split_ratio = six_digits(split->ratio());
       built.certificate.noise->split_resolved = split->resolved;
     }
   } catch (const ResourceError&) {

@@ -123,6 +123,7 @@ PointTaps taps_at_points() {
 BOOST_AUTO_TEST_CASE(points_anywhere_have_the_field) {
   const PointTaps taps = taps_at_points();
   BOOST_TEST(taps.error < 1e-4);
+  constexpr std::uint64_t narrow_memory = std::uint64_t{3} << 18;
   ConeShape plain, few_rows, leaning, displaced;
   few_rows.rows = 9;
   leaning.in_plane_deg = 2;
@@ -156,6 +157,9 @@ BOOST_AUTO_TEST_CASE(points_anywhere_have_the_field) {
     }
     BOOST_TEST(worst <= allowed);
     BOOST_TEST(worst < 1e-3 * largest);
+    // Fewer views at once: the same bits.
+    Device narrow("", narrow_memory);
+    BOOST_TEST((cone_at_points(narrow.state(), ScanInUnits(scan), {}, points, {}) == found));
   }
 }
 

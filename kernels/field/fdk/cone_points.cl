@@ -29,7 +29,8 @@ __kernel void cone_points(__global float* out, __global const float* table,
   const int i = (int)get_global_id(0);
   if (i >= shape.points) return;
   const float4 point = points[i];
-  float sum = 0.0f;
+  // View after view, however many there are at once: the same bits.
+  float sum = shape.adds ? out[i] : 0.0f;
   for (int k = 0; k < shape.views; ++k) {
     const float inverse = 1.0f / along(views[k].lambda, point), u = along(views[k].u, point) * inverse,
                 v = along(views[k].v, point) * inverse, whole_u = floor(u), whole_v = floor(v);
@@ -54,5 +55,5 @@ __kernel void cone_points(__global float* out, __global const float* table,
     const float4 four = total.lo + total.hi;
     sum = fma(inverse * inverse, (four.x + four.y) + (four.z + four.w), sum);
   }
-  out[i] = shape.adds ? out[i] + sum : sum;
+  out[i] = sum;
 }
