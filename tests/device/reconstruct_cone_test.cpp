@@ -122,7 +122,8 @@ PointTaps taps_at_points() {
 
 BOOST_AUTO_TEST_CASE(points_anywhere_have_the_field) {
   const PointTaps taps = taps_at_points();
-  BOOST_TEST(taps.error < 1e-4);
+  // What the header says of them.
+  BOOST_TEST((1 + taps.gain) * taps.error < 1e-4);
   constexpr std::uint64_t narrow_memory = std::uint64_t{3} << 18;
   ConeShape plain, few_rows, leaning, displaced;
   few_rows.rows = 9;
@@ -156,8 +157,12 @@ BOOST_AUTO_TEST_CASE(points_anywhere_have_the_field) {
       largest = std::max(largest, std::abs(truth[i]));
     }
     BOOST_TEST(worst <= allowed);
-    BOOST_TEST(worst < 1e-3 * largest);
-    // Fewer views at once: the same bits.
+    // The bugs that are seeded here (a row off) move values by most of the largest.
+    constexpr double telling = 0.05;
+    BOOST_TEST(allowed < telling * largest);
+    // Fewer views at once than eight: the same bits.
+    BOOST_TEST(ConeTables(device.state(), filtered, 2, {6, -6, shape.rows + 6, false}).bytes(8) >
+               narrow_memory / 2);
     Device narrow("", narrow_memory);
     BOOST_TEST((cone_at_points(narrow.state(), ScanInUnits(scan), {}, points, {}) == found));
   }
