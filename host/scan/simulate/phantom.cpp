@@ -63,30 +63,45 @@ double chord(const Ellipsoid& e, double theta, double u, double v) {
   return value;
 }
 
-// Of a whole line: in coordinates in which the ellipsoid is the unit ball, its part within is between the
-// roots of |p + s d|^2 = 1.
-double chord_of_line(const Ellipsoid& e, const Vec3& point, const Vec3& direction) {
-  const double c = std::cos(e.phi_deg * radians_per_degree), s = std::sin(e.phi_deg * radians_per_degree);
-  const auto turned = [&](const Vec3& v) {
-    return Vec3{(v[0] * c + v[1] * s) / e.semi_axes[0], (v[1] * c - v[0] * s) / e.semi_axes[1],
-                v[2] / e.semi_axes[2]};
-  };
-  const Vec3 p = turned({point[0] - e.center[0], point[1] - e.center[1], point[2] - e.center[2]}),
-             d = turned(direction);
-  const auto product = [](const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; };
+// Turned about z as its first two axes are; sine and cosine once, not at every ray and every point.
+class TurnedEllipsoid {
+ public:
+  explicit TurnedEllipsoid(const Ellipsoid& e)
+      : e_(e), c_(std::cos(e.phi_deg * radians_per_degree)), s_(std::sin(e.phi_deg * radians_per_degree)) {}
+
+  [[nodiscard]] double chord_of_line(const Vec3& point, const Vec3& direction) const;
+  [[nodiscard]] bool contains(const Vec3& point) const;
+  [[nodiscard]] double density() const { return e_.density; }
+
+ private:
+  // A vector from its centre, in coordinates in which it is the unit ball.
+  [[nodiscard]] Vec3 in_ball(const Vec3& v) const {
+    return {(v[0] * c_ + v[1] * s_) / e_.semi_axes[0], (v[1] * c_ - v[0] * s_) / e_.semi_axes[1],
+            v[2] / e_.semi_axes[2]};
+  }
+  [[nodiscard]] Vec3 from_centre(const Vec3& p) const {
+    return {p[0] - e_.center[0], p[1] - e_.center[1], p[2] - e_.center[2]};
+  }
+
+  Ellipsoid e_;
+  double c_, s_;
+};
+
+double product(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+// Of a whole line: its part within the unit ball is between the roots of |p + s d|^2 = 1.
+double TurnedEllipsoid::chord_of_line(const Vec3& point, const Vec3& direction) const {
+  const Vec3 p = in_ball(from_centre(point)), d = in_ball(direction);
   // From the point of the line nearest to the centre: a far source costs no digits.
   const double along = product(d, d), to_middle = product(p, d) / along;
   const Vec3 middle{p[0] - to_middle * d[0], p[1] - to_middle * d[1], p[2] - to_middle * d[2]};
   const double rest = 1 - product(middle, middle);
-  return rest > 0 ? 2 * e.density * std::sqrt(rest / along) : 0;
+  return rest > 0 ? 2 * e_.density * std::sqrt(rest / along) : 0;
 }
 
-bool contains(const Ellipsoid& e, const Vec3& p) {
-  const double c = std::cos(e.phi_deg * radians_per_degree), s = std::sin(e.phi_deg * radians_per_degree);
-  const double x = p[0] - e.center[0], y = p[1] - e.center[1];
-  const double a = (x * c + y * s) / e.semi_axes[0], b = (y * c - x * s) / e.semi_axes[1];
-  const double h = (p[2] - e.center[2]) / e.semi_axes[2];
-  return a * a + b * b + h * h <= 1;
+bool TurnedEllipsoid::contains(const Vec3& point) const {
+  const Vec3 p = in_ball(from_centre(point));
+  return product(p, p) <= 1;
 }
 
 void check(const Ellipsoid& e, std::size_t index) {
@@ -119,14 +134,15 @@ Phantom ellipsoid_list(std::vector<Ellipsoid> ellipsoids, double background, std
   if (!std::isfinite(background)) throw InputError(fmt::format("background {} is not finite", background));
   for (std::size_t i = 0; i < ellipsoids.size(); ++i) check(ellipsoids[i], i);
 
+  const std::vector<TurnedEllipsoid> turned(ellipsoids.begin(), ellipsoids.end());
   Phantom p;
   p.name = std::move(name);
   p.background = background;
   p.description = to_json(ellipsoids, background).dump();
-  p.density = [ellipsoids, background](const Vec3& point) {
+  p.density = [turned, background](const Vec3& point) {
     double sum = background;
-    for (const Ellipsoid& e : ellipsoids)
-      if (contains(e, point)) sum += e.density;
+    for (const TurnedEllipsoid& e : turned)
+      if (e.contains(point)) sum += e.density();
     return sum;
   };
   // The constant's own integral over an endless line is infinite, never silently left out.
@@ -142,9 +158,9 @@ Phantom ellipsoid_list(std::vector<Ellipsoid> ellipsoids, double background, std
     std::fill(out.begin(), out.end(), start);
     for (const Ellipsoid& e : ellipsoids) add_view(e, theta, u, v, out);
   };
-  p.ray_integral = [ellipsoids, background](const Vec3& point, const Vec3& direction) {
+  p.ray_integral = [turned, background](const Vec3& point, const Vec3& direction) {
     double sum = background == 0 ? 0 : std::copysign(std::numeric_limits<double>::infinity(), background);
-    for (const Ellipsoid& e : ellipsoids) sum += chord_of_line(e, point, direction);
+    for (const TurnedEllipsoid& e : turned) sum += e.chord_of_line(point, direction);
     return sum;
   };
   p.ellipsoids = std::move(ellipsoids);
