@@ -89,8 +89,8 @@ void print_field_noise(const FieldNoise& noise, const Plan& plan) {
   else fmt::print("  tolerance    epsilon is {:.2f} sigma\n", plan.epsilon_abs / median);
   for (const SigmaForecast& f : noise.forecasts)
     fmt::print(
-        "  {:g} sigma      {:.3g} % of the range in the middle: {:.3f} samples per base sample foreseen, "
-        "brick by brick\n",
+        "  {:g} sigma      {:.3g} % of the range in the middle: {:.3f} samples per base sample foreseen "
+        "before repair, brick by brick\n",
         f.multiple, 100 * f.multiple * median / plan.reference_range, f.samples_ratio);
 }
 

@@ -129,8 +129,8 @@ void print_plan(const Planned& p, const std::optional<PictureForecast>& forecast
   if (forecast) print_forecast(*forecast, plan);
   else
     fmt::print(
-        "foreseen       {:.3f} samples stored per base sample, {} of memory, {:.1f} s, {} gold samples per "
-        "pass\n",
+        "foreseen       {:.3f} samples stored per base sample before repair, {} of memory, {:.1f} s, {} gold "
+        "samples per pass\n",
         plan.samples_ratio, bytes_text(plan.memory_bytes), plan.seconds, plan.gold_samples);
   if (const std::uint64_t bytes = scratch_bytes(p.scan); bytes > 0)
     fmt::print("  scratch      {} of files while it runs, since the scan takes an eighth of --max-memory\n",

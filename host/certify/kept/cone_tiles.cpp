@@ -25,7 +25,9 @@ static_assert(sizeof(VdvrConeNodes) == 64);
 namespace {
 
 using std::numbers::pi;
-constexpr std::uint64_t most_table_bytes = std::uint64_t{512} << 20,
+// A table has room for most_views of up to 520 columns and rows: where kept nodes lie in scratch, each table
+// writes them all to disk once more.
+constexpr std::uint64_t most_table_bytes = std::uint64_t{1536} << 20,
                         most_view_bytes = std::uint64_t{16} << 20;
 constexpr std::int64_t side = VDVR_CONE_TILE, heights = VDVR_CONE_HEIGHTS;
 

@@ -74,7 +74,7 @@ struct Plan {
   std::uint64_t tile_bytes = 0;       ///< of tiles before closing, wherever they lie
   double seconds = 0;                 ///< foreseen for build, from a measured back-projection rate
   double seconds_of_rows = 0;  ///< of those, what grows with the detector's rows and not with the grid's
-  double samples_ratio = 0;    ///< storage foreseen, from a sample of bricks
+  double samples_ratio = 0;    ///< storage foreseen before repair, from a sample of bricks
   std::int64_t not_covered_count = 0;
   double not_covered_fraction = 0;
   Volume base;             ///< the 1x reconstruction it rests on; of an estimate, that of its rows
